@@ -13,6 +13,8 @@ HUGE = 10**100
 """Whole numbers above this are shown by their size: Python does not write the largest ones."""
 SHOWN_VALUE = 60
 """Largest number of characters of a refused value that a message shows."""
+MILLI, MICRO = 1e3, 1e6
+"""Factors of figures that are shown in thousandths and millionths of their units."""
 
 
 class UnfitError(ValueError):

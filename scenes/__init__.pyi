@@ -15,6 +15,6 @@ from scenes.mujoco.hand_scenes import HandScene as HandScene
 from scenes.mujoco.hand_scenes import build_hand_scene as build_hand_scene
 from scenes.mujoco.held_scene import HeldScene as HeldScene
 from scenes.mujoco.held_scene import build_held_scene as build_held_scene
+from scenes.mujoco_options import PhysicsSettings as PhysicsSettings
 from scenes.settings import FingerSettings as FingerSettings
 from scenes.settings import HeldSettings as HeldSettings
-from scenes.settings import PhysicsSettings as PhysicsSettings

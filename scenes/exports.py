@@ -19,7 +19,7 @@ from grasp_core.planning.result import Plan
 from grasp_core.values import Grasp
 from scenes.drawing import sheets
 from scenes.drawing.painting import approaches
-from scenes.mujoco.fingertips import fitting_radius
+from scenes.mujoco.fingertip_room import fitting_radius
 from scenes.settings import EXPORT_ENDINGS, GraspFormat
 
 ROD_LENGTH = 0.5

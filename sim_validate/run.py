@@ -1,22 +1,24 @@
 """Runs the command `run`, which plans grasps, simulates them and writes all results."""
 
 import re
+from collections.abc import Generator
+from contextlib import contextmanager
 from pathlib import Path
 
 from grasp_core.errors import GraspError
 from grasp_core.files.file_kinds import GRASPS
 from grasp_core.files.text_files import write_text
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.planning.result import Plan
 from grasp_core.records.grasps_json import plan_to_json
 from grasp_core.stopping import Stop
 from sim_validate.closure.command import prepared, simulate_grasps
+from sim_validate.closure.validate import checked_for
 from sim_validate.commands import simulation_flags
 from sim_validate.commands.console import Reporter
 from sim_validate.commands.exit_codes import Exit, reason_of
 from sim_validate.commands.flags import ReportFlags
-from sim_validate.engine.gate import require_faithful
-from sim_validate.engine.setup import Agenda, Setup
-from sim_validate.execution.command import check_executing, execute_grasps, execution_of_run
+from sim_validate.execution.command import execute_grasps, execution_settings, refuse_executing
 from sim_validate.files.output_folders import alone_in
 from sim_validate.files.results_folder import REPORT, remove_results, require_report_folder
 from sim_validate.planning.asked_objects import asked_finger, object_to_plan
@@ -33,9 +35,9 @@ from sim_validate.report.command import shown_report
 
 RESULTS = Path("graspproof-out")
 """Folder in which each object gets its own folder of results if --out is not given."""
-HASHED = 8
+HASH_DIGITS = 8
 """Number of hash digits in a folder's name that tell apart objects with similar names."""
-NAMED = 60
+NAME_LETTERS = 60
 """Largest number of characters of an object's name in the name of its folder; with four bytes each
 they still fit the limit of file systems."""
 REPORTED = 200
@@ -44,85 +46,83 @@ REPORTED = 200
 
 def run_object(command: simulation_flags.RunFlags, reporter: Reporter) -> int:
     """Plan grasps of an object, simulate them, and write and show all results."""
-    planning = command.planning
-    check_executing(command)
-    trials = prepared(
-        command.testing, asked_finger(planning), planning.seed, command.out or RESULTS
-    )
+    planning, testing, executing = command.planning, command.testing, command.executing
+    jobs, seed, finger = testing.jobs, planning.seed, asked_finger(planning)
+    if not command.execute:
+        refuse_executing(executing)
+    setup, agenda = prepared(testing, finger, seed, command.out or RESULTS)
     body = object_to_plan(command.object, planning, reporter)
+    execution = execution_settings(executing, body, seed, finger) if command.execute else None
     folder = command.out or RESULTS / _folder_name(body)
     with alone_in(folder):
         if not command.no_report:
             require_report_folder(folder / REPORT)
-        require_faithful(trials[0], planning.friction, body.radius)
-        return _run_in(folder, body, command, trials, reporter)
+        checked_for(body, planning.friction, agenda, setup)
+        ready(jobs, reporter)
+        stop, later = Stop(seconds=planning.time_limit_s), 1 + command.execute
+        with interrupts_end(stop):
+            found = plan_object(body, planning, jobs, stop, planning.regions + later, reporter)
+            remove_results(folder)
+            proving = stop.part(1 + later)
+            found = with_regions(body, found, planning, folder, jobs, proving, reporter)
+            write_text(folder / GRASPS, plan_to_json(body, found))
+        ended = _show_plan(body, found, folder, reporter)
+        if found.absence:
+            return ended or Exit.NONE
+        if stop.asked:
+            return Exit.INTERRUPTED
+        for grasp in found.grasps:
+            scene = setup.scene(body, grasp, found.friction)
+            write_text(folder / "scenes" / f"{grasp.id}.xml", scene.xml)
+        simulated, verdicts = simulate_grasps(
+            found, setup, agenda, jobs=jobs, folder=folder, reporter=reporter, stop=stop.part(later)
+        )
+        reporter.say(f"results in {folder}/: grasps.json, verdicts.json, scenes/")
+        with _reported(None if command.no_report else folder, jobs, reporter):
+            document, complete, survived = verdicts.document(), verdicts.complete, Exit.GOOD
+            if execution is not None:
+                survived, executions = execute_grasps(
+                    found, execution, jobs=jobs, folder=folder, reporter=reporter, stop=stop
+                )
+                document["executions"] = executions.document()
+                complete = complete and executions.complete
+            reporter.document(document)
+    if not complete:
+        reporter.warn("the time limit ended the trials: not all grasps have results")
+        ended = Exit.PARTIAL
+    return max(simulated, survived, ended)
 
 
-def _run_in(
-    folder: Path,
-    body: Polyhedron,
-    command: simulation_flags.RunFlags,
-    trials: tuple[Setup, Agenda],
-    reporter: Reporter,
-) -> int:
-    (setup, agenda), jobs, planning = trials, command.testing.jobs, command.planning
-    execution = execution_of_run(command, body)
-    ready(jobs, reporter)
-    stop, later = Stop(seconds=planning.time_limit_s), 1 + command.execute
-    with interrupts_end(stop):
-        found = plan_object(body, planning, jobs, stop, planning.regions + later, reporter)
-        remove_results(folder)
-        proving = stop.part(1 + later)
-        found = with_regions(body, found, planning, folder, jobs, proving, reporter)
-        write_text(folder / GRASPS, plan_to_json(body, found))
+def _show_plan(body: Polyhedron, found: Plan, folder: Path, reporter: Reporter) -> int:
+    """Show what was planned; return the exit code of a plan that was ended early."""
     say_counts(body, found, reporter)
-    early = say_ended(found, reporter)
+    code = say_ended(found, reporter)
     if found.absence:
         reporter.say(found.absence)
         reporter.document({"absence": found.absence, "out": str(folder)})
-        return early or Exit.NONE
-    if found.moves:
+    elif found.moves:
         show_gains(found.moves, reporter)
-    if stop.asked:
-        return Exit.INTERRUPTED
-    for grasp in found.grasps:
-        scene = setup.scene(body, grasp, found.friction)
-        write_text(folder / "scenes" / f"{grasp.id}.xml", scene.xml)
-    code, verdicts = simulate_grasps(
-        found, setup, agenda, jobs=jobs, folder=folder, reporter=reporter, stop=stop.part(later)
-    )
-    reporter.say(f"results in {folder}/: grasps.json, verdicts.json, scenes/")
-    complete = verdicts.complete
-    try:
-        document = verdicts.document()
-        if execution is not None:
-            survival, executions = execute_grasps(
-                found, execution, jobs=jobs, folder=folder, reporter=reporter, stop=stop
-            )
-            document["executions"] = executions.document()
-            code, complete = max(code, survival), complete and executions.complete
-        reporter.document(document)
-    except GraspError:  # the other results are complete, so that pages can show them
-        _report(command, folder, reporter)
-        raise
-    _report(command, folder, reporter)
-    if not complete:
-        reporter.warn("the time limit ended the trials: not all grasps have results")
-        early = Exit.PARTIAL
-    return max(code, early)
+    return code
 
 
-def _report(command: simulation_flags.RunFlags, folder: Path, reporter: Reporter) -> None:
-    """Write the results of a run as pages if asked to; a failure only gives a warning."""
-    if command.no_report:
-        return
+@contextmanager
+def _reported(folder: Path | None, jobs: int, reporter: Reporter) -> Generator[None, None, None]:
+    """Write results as pages after the last of them; a page that fails only gives a warning."""
+    failed: GraspError | None = None
     try:
-        shown_report(ReportFlags(folder, limit=REPORTED, jobs=command.testing.jobs), reporter)
+        yield
+    except GraspError as error:  # the other results are complete, so that pages can show them
+        failed = error
+    try:
+        if folder is not None:
+            shown_report(ReportFlags(folder, limit=REPORTED, jobs=jobs), reporter)
     except (GraspError, OSError) as error:
         reporter.warn(f"no report: {reason_of(error)}")
+    if failed is not None:
+        raise failed
 
 
 def _folder_name(body: Polyhedron) -> str:
     """Turn an object's name into a safe folder name; a name that changes gets a hash added."""
-    plain = re.sub(r"[^\w-]+", "_", body.name)[:NAMED] or "object"
-    return plain if plain == body.name else f"{plain}-{body.content_sha256[:HASHED]}"
+    plain = re.sub(r"[^\w-]+", "_", body.name)[:NAME_LETTERS] or "object"
+    return plain if plain == body.name else f"{plain}-{body.content_sha256[:HASH_DIGITS]}"

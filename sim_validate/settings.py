@@ -28,7 +28,7 @@ from grasp_core.settings import Settings
 from scenes.settings import SAMPLE_S, HeldSettings
 
 Duration = Annotated[float, Interval(ge=0.05, le=60.0)]
-Settling = Annotated[float, Interval(ge=1.0, le=100.0)]
+SettlingFriction = Annotated[float, Interval(ge=1.0, le=100.0)]
 Rounds = Annotated[int, Interval(ge=1, le=40)]
 Spans = tuple[Annotated[float, Interval(gt=0.0, lt=1.0)], ...]
 
@@ -56,7 +56,7 @@ class HoldProtocol(Settings):
     settle_s: Duration = 0.10
     hold_s: Annotated[float, Interval(ge=0.2, le=60.0)] = 0.40
     """Duration of the hold [s]; a shorter one does not see a small imbalance move anything."""
-    settling_friction: Settling = 3.0
+    settling_friction: SettlingFriction = 3.0
     """Friction while loading, relative to the friction under test. In trials of negative controls
     (contacts that must fail) it is relative to the larger of that friction and the one that the
     planned forces need."""
@@ -110,7 +110,7 @@ class FrictionProtocol(Settings):
     searched in turn until the critical friction is found."""
     rounds: Rounds = 4
     """How often bisection halves an interval."""
-    settling_friction: Settling = 5.0
+    settling_friction: SettlingFriction = 5.0
     """Friction while the fingers squeeze, relative to the predicted critical friction."""
     least_friction: Annotated[float, Interval(ge=1e-6, le=0.01)] = 1e-3
     """Least friction that is simulated; the only one tried where the prediction is smaller."""
@@ -168,13 +168,13 @@ TrialKind: TypeAlias = Literal["weight", "lift", "shake", "stop", "knock", "misp
 """What a trial does: it turns gravity through all directions, lifts the object off a table, shakes
 or stops the palm, strikes the object, or closes fingers on an object that is not where it should
 be."""
-KINDS: tuple[TrialKind, ...] = get_args(TrialKind)
+TRIAL_KINDS: tuple[TrialKind, ...] = get_args(TrialKind)
 OffBy: TypeAlias = Literal["exactly", "deviation"]
 KNOCK_M_PER_S = 1.0 / 6.0
 """Speed that the usual knock gives a free object [m/s], 0.05 N s for 0.3 kg. So its load grows with
 the mass, as those of all other trials do, and a screw is not shot away."""
 
-ROUNDING = 1e-9
+DURATION_SLACK = 1e-9
 """Relative size of differences that are rounding."""
 LONGEST_S = 100.0
 """Longest duration of a lift or a stop [s]."""
@@ -197,7 +197,7 @@ class Holding(HeldSettings):
 class ChosenExecution(Holding):
     """How grasps are executed, and how far an object may move and still count as held."""
 
-    trials: tuple[TrialKind, ...] = KINDS
+    trials: tuple[TrialKind, ...] = TRIAL_KINDS
     """Names of the trials."""
     lift_m: Quantity = 0.2
     """Height by which the object is lifted off its table [m]."""
@@ -232,15 +232,17 @@ class ChosenExecution(Holding):
     def _check_together(self) -> None:
         HeldSettings._check_together(self)
         if not self.trials:
-            raise FieldError("trials", f"must name at least one of {', '.join(KINDS)}, got none")
-        object.__setattr__(self, "trials", tuple(kind for kind in KINDS if kind in self.trials))
+            known = ", ".join(TRIAL_KINDS)
+            raise FieldError("trials", f"must name at least one of {known}, got none")
+        ordered = tuple(kind for kind in TRIAL_KINDS if kind in self.trials)
+        object.__setattr__(self, "trials", ordered)
         stopping = self.stop_from_m_per_s / self.stop_m_per_s2
         if stopping > LONGEST_S:
             raise InputError(
                 f"stop_from_m_per_s over stop_m_per_s2 is the duration of a stop, at most "
                 f"{LONGEST_S:g} s, got {stopping:.3g} s; start slower, or stop harder"
             )
-        if stopping < SAMPLE_S * (1.0 - ROUNDING):
+        if stopping < SAMPLE_S * (1.0 - DURATION_SLACK):
             raise InputError(
                 f"stop_from_m_per_s over stop_m_per_s2 is the duration of a stop, at least the "
                 f"{SAMPLE_S:g} s of a sample, got {stopping:.3g} s; start faster, or stop with at "

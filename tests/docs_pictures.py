@@ -60,7 +60,7 @@ from sim_validate.report.charts import (
     motion_panels,
     wrench_figure,
 )
-from sim_validate.settings import KINDS, ExecutionSettings
+from sim_validate.settings import TRIAL_KINDS, ExecutionSettings
 from tests.scenes.drawing.standing import standing
 
 FOLDER = Path(__file__).parent.parent / "docs" / "pictures"
@@ -232,7 +232,7 @@ def trials():
     grasp = gc.plan(body, FRICTION, limit=1).grasps[0]
     runs = [hardest(body, grasp, mass_kg) for mass_kg in MASSES_KG]
     marks = []
-    for place, kind in enumerate(KINDS):
+    for place, kind in enumerate(TRIAL_KINDS):
         left, top = 30.0 + 300.0 * (place % 3), 30.0 + 205.0 * (place // 3)
         longest = max(float(run[kind][0][-1]) for run in runs)
         panel = Panel(left, top, 250.0, 140.0, Axis(0.0, longest), Axis(0.0, 8.0))

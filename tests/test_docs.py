@@ -24,7 +24,7 @@ from sim_validate.engine.setup import Setup, setup_from_file, wrenches_from_file
 from sim_validate.engine.traces import Outcome
 from sim_validate.execution.verdict import Fate
 from sim_validate.main import main
-from sim_validate.settings import KINDS, ChosenExecution
+from sim_validate.settings import TRIAL_KINDS, ChosenExecution
 from tests import file_reference
 from tests.sim_validate.datasets.configs import build_small
 
@@ -176,7 +176,7 @@ def test_the_fields_of_files_are_those_of_the_page(tmp_path):
 
 def test_the_page_of_executions_names_every_trial_fate_and_flag():
     page = PAGES["simulation"]
-    assert listed("simulation", "### The trials") == list(KINDS)
+    assert listed("simulation", "### The trials") == list(TRIAL_KINDS)
     assert all(f"`{fate}`" in page for fate in get_args(Fate))
     for name in (field.name for field in fields(ChosenExecution) if field.name != "trials"):
         assert f"`--{name.replace('_', '-')}" in page, name

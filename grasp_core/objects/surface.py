@@ -20,6 +20,7 @@ from grasp_core.by_value import counted, summary
 from grasp_core.declared import Declared, declared
 from grasp_core.errors import MeshError, MeshRefusal
 from grasp_core.kinds import LARGEST, NotNegative, Number
+from grasp_core.messages import MILLI
 from grasp_core.values import RIGHT_ANGLE
 
 TRIANGLES_AT_EDGE = 2
@@ -330,9 +331,6 @@ class Face(Declared):
         return summary("Face", *parts, area=self.area, centroid=self.centroid, normal=self.normal)
 
 
-MM = 1e3
-
-
 @declared
 class Surface(Declared):
     """What is known of an object's triangles."""
@@ -372,7 +370,7 @@ class Surface(Declared):
         if self.holes:
             yield (
                 f"{self.holes} hole{'s' * (self.holes > 1)} in the surface, at most "
-                f"{MM * self.largest_hole_m:.3g} mm wide, "
+                f"{MILLI * self.largest_hole_m:.3g} mm wide, "
                 f"{'are' if self.holes > 1 else 'is'} closed for volume and centre of mass, which "
                 f"makes the volume uncertain by at most {100.0 * self.volume_error:.2g} %; no "
                 "finger is placed there"

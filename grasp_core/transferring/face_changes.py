@@ -47,6 +47,7 @@ from grasp_core.arrays import Array, cross
 from grasp_core.by_value import counted
 from grasp_core.declared import Declared, declared
 from grasp_core.kinds import FaceTurn, Vector, number, value_of
+from grasp_core.messages import MILLI
 from grasp_core.objects.on_faces import nearest_on_triangles, on_face_slack
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.surface import Face
@@ -66,7 +67,6 @@ TURNED = 1e-4
 than a hundredth of the part."""
 RESHAPED = 1e-5  # least change of a face's area that counts, relative to its area
 FACES_IN_A_LINE = 12  # largest number of faces that one line names
-MM = 1e3
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,7 +143,7 @@ class FaceChange(Declared):
             return f"{name} is as it was"
         way = "outward" if self.distance > 0.0 else "inward"
         turned = f" and turned {math.degrees(self.turn):.2f} deg" if self.turn > TURNED else ""
-        return f"{name} moved {abs(MM * self.distance):.2f} mm {way}{turned}"
+        return f"{name} moved {abs(MILLI * self.distance):.2f} mm {way}{turned}"
 
 
 def changes_in_words(

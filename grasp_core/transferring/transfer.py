@@ -48,6 +48,7 @@ from grasp_core.files.records import UNRECORDED
 from grasp_core.kinds import Friction, Null, OrInfinity, instance, several, value_of
 from grasp_core.mesh_files.limits import MeshLimits
 from grasp_core.mesh_files.reading import read_triangles
+from grasp_core.messages import MILLI
 from grasp_core.objects.build import DEFAULT_LIMITS
 from grasp_core.objects.face_pieces import piece_of
 from grasp_core.objects.on_faces import check_on_faces, check_planar
@@ -58,7 +59,6 @@ from grasp_core.planning.reach import Finger, reach
 from grasp_core.transferring.face_changes import (
     ANGLE_DEG,
     CHANGE_ROUNDING,
-    MM,
     FaceChange,
     Likeness,
     added_faces,
@@ -320,8 +320,8 @@ class _Judge:
     def _lost(self, lost: CarriedContact) -> str:
         near = f"no face is within {math.degrees(self.rule.angle):.4g} deg of it"
         if math.isfinite(lost.distance):
-            reach = f"distance_m allows {MM * self.rule.reach:.2f} mm"
-            near = f"the nearest face like it is {MM * lost.distance:.2f} mm away, {reach}"
+            reach = f"distance_m allows {MILLI * self.rule.reach:.2f} mm"
+            near = f"the nearest face like it is {MILLI * lost.distance:.2f} mm away, {reach}"
         return f"finger {lost.finger} has lost face {lost.old_face}: {near}"
 
 

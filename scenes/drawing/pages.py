@@ -28,6 +28,7 @@ from grasp_core.files.text_files import write_parts
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach
 from grasp_core.kinds import path_of
+from grasp_core.messages import MILLI
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.result import Plan
 from grasp_core.values import Grasp
@@ -54,7 +55,7 @@ OF_OBJECT = ("object", "edge")
 """Roles of what the grasps of one object share."""
 PER_RADIUS = 1000.0
 """Number of units of length in one object radius."""
-MM, CM3 = 1e3, 1e6
+CM3 = 1e6
 PAGE_WIDTH, PAGE_HEIGHT = 900, 640
 Fact: TypeAlias = tuple[str, str, str]
 """Name, value and meaning of a figure on a page."""
@@ -222,7 +223,7 @@ def grasp_facts(
         "Faces" if body.patches is None else "Patches",
         ", ".join(map(str, grasp.faces)), "numbers of those that the fingers stand on, by finger",
     )  # fmt: skip
-    disc = f"{number(MM * grasp.radius)} mm{at_plan}" if grasp.radius else "none is claimed"
+    disc = f"{number(MILLI * grasp.radius)} mm{at_plan}" if grasp.radius else "none is claimed"
     yield "Smallest independent disc", disc, DISC
     yield "Critical friction", f"{number(grasp.critical_friction)}{in_simulation}", CRITICAL
     yield "Margin of closure", f"{number(grasp.closure_margin)}{at_plan}", MARGIN_SAID
@@ -267,7 +268,7 @@ def html_of(value: object) -> str | None:
     return card(_alone(value), value.name, [
         ("faces" if value.patches is None else "patches", str(len(value.faces))),
         ("triangles", str(len(value.triangles))),
-        ("radius", f"{MM * value.radius:.4g} mm"),
+        ("radius", f"{MILLI * value.radius:.4g} mm"),
         ("volume" if value.surface.closed else "volume of the hull",
          f"{CM3 * value.volume:.4g} cm³"),
     ])  # fmt: skip
@@ -315,7 +316,12 @@ def _plan(plan: Plan) -> str:
     first = Drawing(body, plan[0], plan.friction)
     rows: list[TableRow] = [("grasp", "family", "radius", "closure margin")]
     rows += [
-        (g.id, g.family, f"{MM * g.radius:.3g} mm" if g.radius else "-", f"{g.closure_margin:.4g}")
+        (
+            g.id,
+            g.family,
+            f"{MILLI * g.radius:.3g} mm" if g.radius else "-",
+            f"{g.closure_margin:.4g}",
+        )
         for g in plan[:LEGEND_ROWS]
     ]
     rows += [("...",)] if len(plan) > LEGEND_ROWS else []

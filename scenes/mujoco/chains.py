@@ -43,9 +43,9 @@ from grasp_core.hands.hand_motors import chains
 from grasp_core.hands.reach import Stance
 from grasp_core.quality.motors import Motors
 from scenes.mujoco.mjcf_text import (
-    FREE,
-    SHAPES,
-    TIP,
+    FREE_JOINT,
+    SHAPE_BIT,
+    TIP_LOOK,
     Element,
     Parts,
     add_element,
@@ -56,7 +56,7 @@ from scenes.mujoco.mjcf_text import (
 
 DENSITY_KG_M3 = 1000.0
 """Density of links: the one that MuJoCo takes itself."""
-BALL = LinkShape(np.zeros(3), np.eye(3), np.zeros(3), 0.01)
+PLAIN_BALL = LinkShape(np.zeros(3), np.eye(3), np.zeros(3), 0.01)
 """What a link without shapes is taken for."""
 LEAST_KG, LEAST_M = 1e-6, 1e-6
 """Least mass of a link [kg], and least length of a shape [m]: the simulator refuses none at all."""
@@ -66,7 +66,7 @@ NOMINAL_M = 0.01
 """Radius of gyration of links [m]: small beside the inertia that servos are given."""
 THIN_M = 1e-6
 """Least half-size of a box, for shapes that are flat [m]."""
-ROOT, TOLD = "root", "told"
+ROOT, ROOT_TOLD = "root", "told"
 """Names of the body that a weld holds, and of the one that moves as told."""
 REFINED = 3
 """Newton steps that put fingertips on their faces: from 10 micrometres to rounding."""
@@ -81,7 +81,7 @@ def hand_inertials(hand: Hand) -> dict[str, dict[str, object]]:
 def _inertial(shapes: Sequence[LinkShape], link: Link | None) -> dict[str, object]:
     if link is not None and link.mass_kg == 0.0 and shapes:
         link = None  # what has a shape is not as light as a frame
-    shapes = shapes or (BALL,)
+    shapes = shapes or (PLAIN_BALL,)
     known = None if link is None else link.mass_kg
     center = None if link is None else link.center_of_mass
     volumes = np.array([_volume(shape) for shape in shapes])
@@ -119,17 +119,17 @@ class Weld(Declared):
         Both are written at the origin: MuJoCo takes the place of a body that has no mass of its own
         for its centre of mass, and measures the weld's stiffness there.
         """
-        add_element(world, "body", {"name": TOLD, "mocap": "true"})
+        add_element(world, "body", {"name": ROOT_TOLD, "mocap": "true"})
         body = add_element(world, "body", {"name": ROOT})
         add_element(body, "freejoint", {"name": ROOT})
-        both = {"body1": TOLD, "body2": ROOT, "solref": self.solref, "solimp": self.solimp,
+        both = {"body1": ROOT_TOLD, "body2": ROOT, "solref": self.solref, "solimp": self.solimp,
                 "anchor": (0.0, 0.0, 0.0), "torquescale": 1.0}  # fmt: skip
         add_element(parts["equality"], "weld", both)
         return body
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False, kw_only=True)
-class Chains(ByValue):
+class HandChains(ByValue):
     """A hand in a pose, with what its joints, shapes and fingertips are to be in a scene."""
 
     hand: Hand
@@ -199,14 +199,14 @@ class Chains(ByValue):
                  "limited": "false" if self.weld is None else "true",
                  "range": (joint.lowest - angle, joint.highest - angle),
                  "armature": self.armature_kg_m2}  # fmt: skip
-        add_element(body, "joint", FREE | hinge)
+        add_element(body, "joint", FREE_JOINT | hinge)
         nominal = {"pos": center, "mass": mass, "diaginertia": (mass * NOMINAL_M**2,) * 3}
         add_element(body, "inertial", self.inertials.get(link.name, nominal))
         return body
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False, kw_only=True)
-class StandingHand(Chains):
+class StandingHand(HandChains):
     """A hand that stands in a grasp, whose used fingers are in the order of the contacts."""
 
     motors: Motors
@@ -327,10 +327,10 @@ def _tip(parts: Parts, finger: HandFinger) -> dict[str, Any]:
     name = f"tip_{finger.name}"
     tip = {"name": name, "type": "sphere", "size": finger.tip.radius, "pos": finger.tip.center}
     if finger.tip.corners is None:
-        return tip | TIP
+        return tip | TIP_LOOK
     solid = {"name": name, "inertia": "shell", "vertex": to_digits(finger.tip.corners)}
     add_element(parts["asset"], "mesh", solid)
-    return tip | TIP | {"type": "mesh", "mesh": name, "pos": np.zeros(3), "contype": SHAPES}
+    return tip | TIP_LOOK | {"type": "mesh", "mesh": name, "pos": np.zeros(3), "contype": SHAPE_BIT}
 
 
 def _shape(
@@ -338,7 +338,7 @@ def _shape(
 ) -> None:
     """Add a shape: a ball, a capsule, or the box inside a rounded one that meets its corners."""
     long = np.flatnonzero(shape.half_sizes > 0.0)
-    own: dict[str, Any] = {"name": name, "contype": SHAPES, "conaffinity": SHAPES | touches,
+    own: dict[str, Any] = {"name": name, "contype": SHAPE_BIT, "conaffinity": SHAPE_BIT | touches,
                            "mass": 0.0, "group": 2, "rgba": (0.62, 0.66, 0.72, 1.0)}  # fmt: skip
     turned = shape.rotation
     if not long.size:

@@ -8,9 +8,9 @@ from grasp_core.geometry.vectors_kernel import cross, dotted
 
 MOST_HALVINGS = 12
 """Halvings of the depth after which a pyramid is left as it is: the object is a sheet there."""
-PARALLEL = 1e-12
+PARALLEL_EDGES = 1e-12
 """Sine of the angle between edges below which their cross product is no axis."""
-CORNERS = 3
+TRIANGLE_CORNERS = 3
 
 
 @loop()
@@ -52,7 +52,7 @@ def clear_depth(
 def _is_beside(middle: Array, inward: Array, depth: float, triangle: Array, slack: float) -> bool:
     """Return whether a triangle lies above the base or below the apex."""
     low, high = np.inf, -np.inf
-    for k in range(CORNERS):
+    for k in range(TRIANGLE_CORNERS):
         height = 0.0
         for j in range(3):
             height += (triangle[k, j] - middle[j]) * inward[j]
@@ -67,10 +67,10 @@ def _separated(solid: Array, along: Array, triangle: Array, slack: float) -> boo
     Axes are normals of the pyramid's slopes and of the triangle, and cross products of an edge of
     each; the base's normal is left to `_is_beside`.
     """
-    n, axis, sides = len(solid) - 1, np.empty(3), np.empty((CORNERS, 3))
-    for k in range(CORNERS):
+    n, axis, sides = len(solid) - 1, np.empty(3), np.empty((TRIANGLE_CORNERS, 3))
+    for k in range(TRIANGLE_CORNERS):
         for j in range(3):
-            sides[k, j] = triangle[(k + 1) % CORNERS, j] - triangle[k, j]
+            sides[k, j] = triangle[(k + 1) % TRIANGLE_CORNERS, j] - triangle[k, j]
     cross(sides[0], sides[1], axis)
     if _apart(axis, solid, triangle, slack):
         return True
@@ -78,10 +78,10 @@ def _separated(solid: Array, along: Array, triangle: Array, slack: float) -> boo
         cross(along[i], along[n + i], axis)
         if _apart(axis, solid, triangle, slack):
             return True
-    for i in range(2 * n * CORNERS):
-        edge, side = along[i // CORNERS], sides[i % CORNERS]
+    for i in range(2 * n * TRIANGLE_CORNERS):
+        edge, side = along[i // TRIANGLE_CORNERS], sides[i % TRIANGLE_CORNERS]
         cross(edge, side, axis)
-        least = PARALLEL * PARALLEL * dotted(edge, edge) * dotted(side, side)
+        least = PARALLEL_EDGES * PARALLEL_EDGES * dotted(edge, edge) * dotted(side, side)
         if dotted(axis, axis) > least and _apart(axis, solid, triangle, slack):
             return True
     return False
@@ -98,7 +98,7 @@ def _apart(axis: Array, solid: Array, triangle: Array, slack: float) -> bool:
         height = dotted(axis, solid[i])
         low, high = min(low, height), max(high, height)
     least, most = np.inf, -np.inf
-    for k in range(CORNERS):
+    for k in range(TRIANGLE_CORNERS):
         height = dotted(axis, triangle[k])
         least, most = min(least, height), max(most, height)
     return max(least - high, low - most) >= -slack * length

@@ -35,11 +35,13 @@ from grasp_core.notebooks import InNotebooks
 from grasp_core.objects.on_faces import check_body, face_under
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
-from scenes.mujoco.fingertips import fitting_radius
-from scenes.mujoco.mjcf_text import FINGERTIPS, SceneText, placed
-from scenes.mujoco.scene_text import HOME, TOUCH, SceneContent, SceneObject, Slides, scene_text
+from scenes.mujoco.fingertip_room import fitting_radius
+from scenes.mujoco.fingertips import Slides
+from scenes.mujoco.mjcf_text import FINGERTIP_BIT, IDENTITY_POSE, SceneText, placed
+from scenes.mujoco.scene_text import TOUCH_DEPTH, SceneContent, SceneObject, scene_text
 from scenes.mujoco.surface import touched_solids
-from scenes.settings import HARD_CONTACTS, FingerSettings, PhysicsSettings, Softness, SurfaceChoice
+from scenes.mujoco_options import HARD_TIPS, PhysicsSettings, Softness
+from scenes.settings import FingerSettings, SurfaceChoice
 
 if TYPE_CHECKING:
     from scenes.mujoco.chains import StandingHand
@@ -60,14 +62,14 @@ STIFFNESS = 5.0
 unstable; above 50 the servos work against the planned forces."""
 LEAST_SIZE = 0.01
 """Smallest grasp size that is used, in object radii, for contacts that are nearly on one line."""
-SQUEEZE = 0.6
+GENTLE_SQUEEZE = 0.6
 """Largest normal force in the gentle grasp that begins a trial, relative to the largest that
 fingers can apply."""
 PAD_HALF_WIDTH = 0.2
 PAD_DEPTH = 0.1
 """Thickness of a pad, the box under a contact that its fingertip touches, in object radii;
 `PAD_HALF_WIDTH` has the same unit."""
-FLAT = 1e-6
+INERTIA_ADDED = 1e-6
 """Share of the largest moment of inertia that is added to all three. Coplanar contacts give moments
 at the very limit of what a body can have, and rounding must not pass that limit."""
 NEARBY = 2.0
@@ -78,7 +80,7 @@ PAD_TOUCH = 1e-9
 """Least depth of fingertips in pads at the start, in grasp sizes. At depth zero, rounding would
 decide which fingertips press in the first step, and the impact of the others one step later can
 tilt lightly held objects by 1e-4."""
-OPEN = -1e-6
+OPEN_MARGIN = -1e-6
 """Margin of closure below which contacts count as open without a proof. It is far beyond the errors
 of compiled code; the worst that could happen is a squeeze along the normals."""
 RETREAT = 0.5
@@ -124,7 +126,7 @@ class Layout(SceneObject):
     """Forces of a gentle grasp in the contact frames, balanced where possible, (k, 3) [N]."""
     approach: Array
     """Starting points of the fingers, relative to their contacts, (k, 3) [m]."""
-    softness: Softness = HARD_CONTACTS
+    softness: Softness = HARD_TIPS
     on_pads: bool = True
     """Whether each fingertip touches a pad at its contact, and not the object's own surface."""
 
@@ -201,7 +203,7 @@ def to_text(layout: Layout, physics: PhysicsSettings) -> str:
     """Write the MJCF text of a layout; equal layouts give equal texts."""
     holder, rubbing = layout.holder, layout.softness.rubbing(layout.friction)
     fingers = range(len(layout.contacts))
-    bits = [1 << finger if layout.on_pads else FINGERTIPS for finger in fingers]
+    bits = [1 << finger if layout.on_pads else FINGERTIP_BIT for finger in fingers]
     return scene_text(
         SceneContent(
             comment=SCALED if isinstance(holder, Slides) else HAND_SCALED,
@@ -241,10 +243,10 @@ def _keys(layout: Layout) -> dict[str, dict[str, Array]]:
         "pregrasp": (away, away),
         "approach": (away, push),
         "grasp": (np.zeros(len(away)), push),
-        "squeeze": (np.zeros(len(away)), push / SQUEEZE),
+        "squeeze": (np.zeros(len(away)), push / GENTLE_SQUEEZE),
     }
     return {
-        name: {"qpos": np.concatenate([HOME, place]), "ctrl": commands}
+        name: {"qpos": np.concatenate([IDENTITY_POSE, place]), "ctrl": commands}
         for name, (place, commands) in told.items()
     }
 
@@ -256,7 +258,7 @@ def surface_of(body: Polyhedron) -> SurfaceChoice:
 
 def arrange(
     body: Polyhedron, grasp: Grasp | Sequence[Contact], friction: float,
-    fingers: FingerSettings | None = None, softness: Softness = HARD_CONTACTS,
+    fingers: FingerSettings | None = None, softness: Softness = HARD_TIPS,
     surface: SurfaceChoice | None = None,
 ) -> Layout:  # fmt: skip
     """Place object, fingertips and drives for a grasp.
@@ -276,7 +278,7 @@ def arrange(
     positions = arms + body.center_of_mass
     size = max(grasp_size(positions), LEAST_SIZE * body.radius)
     on_pads = (surface or surface_of(body)) == "pads"
-    touch = PAD_TOUCH * size if on_pads else TOUCH * body.radius
+    touch = PAD_TOUCH * size if on_pads else TOUCH_DEPTH * body.radius
     drive = _drive(body, positions, normals, fingers, size, touch)
     largest = fingers.max_normal_force_n
     mass = largest * RESPONSE_TIME_S**2 / size
@@ -299,7 +301,7 @@ def arrange(
         friction=friction,
         drive=drive,
         holder=_slides(arms, frames, drive),
-        squeeze=SQUEEZE * largest * _pushes(positions, normals, friction, softness),
+        squeeze=GENTLE_SQUEEZE * largest * _pushes(positions, normals, friction, softness),
         approach=to_digits(-RETREAT * size * _ways_in(grasp, normals, fingers)),
         softness=softness,
         on_pads=on_pads,
@@ -371,7 +373,7 @@ def _inertia(mass: float, positions: Array, size: float) -> Array:
     shared = np.trace(second) * np.eye(3) - second
     _, axes = np.linalg.eigh(shared)
     levers = np.maximum(np.einsum("ij,ik,kj->j", axes, shared, axes), size**2)
-    levers += FLAT * levers.max()
+    levers += INERTIA_ADDED * levers.max()
     return to_digits(0.25 * mass * (axes * levers) @ axes.T)
 
 
@@ -381,7 +383,7 @@ def _pushes(positions: Array, normals: Array, friction: float, softness: Softnes
     _, _, margins = deepest_forces(arms[None], normals[None], np.array([friction]))
     try:
         # a proof takes long, and is not needed where hard fingers are open by far
-        hopeless = margins[0, 1] < OPEN and not softness.is_soft
+        hopeless = margins[0, 1] < OPEN_MARGIN and not softness.is_soft
         forces = None
         if not hopeless:
             soft = softness.torsion_m

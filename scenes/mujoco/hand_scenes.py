@@ -47,10 +47,11 @@ from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
 from scenes.mujoco.chains import StandingHand
-from scenes.mujoco.closure_scene import SQUEEZE, Layout, Scene, arrange, to_text
+from scenes.mujoco.closure_scene import GENTLE_SQUEEZE, Layout, Scene, arrange, to_text
 from scenes.mujoco.held_scene import HeldScene, held_layout, held_physics, held_text
-from scenes.mujoco.mjcf_text import FINGERTIPS
-from scenes.settings import FingerSettings, HeldSettings, PhysicsSettings
+from scenes.mujoco.mjcf_text import FINGERTIP_BIT
+from scenes.mujoco_options import PhysicsSettings
+from scenes.settings import FingerSettings, HeldSettings
 
 TOUCH = 3e-6
 """Depth of fingertips in their faces at the start, in grasp sizes: more than numbers of nine
@@ -93,7 +94,7 @@ def hand_layout(
         damping_n_m_s_per_rad=2.0 * math.sqrt(servo * armature), weighs=down is not None,
     )  # fmt: skip
     local = np.einsum("kij,ki->kj", base.frames, squeeze)
-    return replace(base, holder=holder, squeeze=to_digits(SQUEEZE * local))
+    return replace(base, holder=holder, squeeze=to_digits(GENTLE_SQUEEZE * local))
 
 
 def squeezing(motors: Motors, forces: Array) -> Array:
@@ -216,7 +217,7 @@ def held_hand_scene(
         holder=StandingHand.at(
             stance, body.center_of_mass, base.tip_centers, motors, axes=base.axes,
             normals=base.frames[:, :, 0], servo=servo, damping_n_m_s_per_rad=damper,
-            armature_kg_m2=armature, light_kg=LIGHT_KG, touches=FINGERTIPS,
+            armature_kg_m2=armature, light_kg=LIGHT_KG, touches=FINGERTIP_BIT,
             rubbing=(float(base.friction.max()), 0.0, 0.0),
         ),
     )  # fmt: skip

@@ -30,10 +30,12 @@ from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.kinds import Quantity, instance, value_of
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
-from scenes.mujoco.mjcf_text import FINGERTIPS, SceneText
-from scenes.mujoco.scene_text import HOME, TOUCH, SceneContent, SceneObject, Slides, scene_text
+from scenes.mujoco.fingertips import Slides
+from scenes.mujoco.mjcf_text import FINGERTIP_BIT, IDENTITY_POSE, SceneText
+from scenes.mujoco.scene_text import TOUCH_DEPTH, SceneContent, SceneObject, scene_text
 from scenes.mujoco.surface import touched_solids
-from scenes.settings import SAMPLE_S, HeldSettings, PhysicsSettings
+from scenes.mujoco_options import PhysicsSettings
+from scenes.settings import SAMPLE_S, HeldSettings
 
 if TYPE_CHECKING:
     from scenes.mujoco.chains import StandingHand
@@ -123,7 +125,7 @@ class HeldLayout(SceneObject):
     @property
     def tip_centers(self) -> Array:
         """Return the centres of the fingertips at their contacts, (k, 3) [m]."""
-        height = self.tip_radius_m - TOUCH * self.radius_m
+        height = self.tip_radius_m - TOUCH_DEPTH * self.radius_m
         return self.contacts - height[:, None] * self.frames[:, :, 0]
 
     @property
@@ -158,7 +160,7 @@ def held_layout(
     contacts = to_digits(grip.arms, body.radius)
     axes, stiffness = _spring_axes(grip.stiffness, frames)
     damping = 2.0 * settings.damping_ratio * np.sqrt(stiffness * (mass / len(contacts) + tip_kg))
-    stiffest, heights = float(stiffness.max()), grip.tip_radius_m - TOUCH * body.radius
+    stiffest, heights = float(stiffness.max()), grip.tip_radius_m - TOUCH_DEPTH * body.radius
     inertia = to_digits(mass / body.volume * body.inertia)
     return HeldLayout(
         name=body.name,
@@ -298,7 +300,7 @@ def build_held_scene(
 def held_text(layout: HeldLayout, physics: PhysicsSettings) -> str:
     """Write the MJCF text of a held object; equal layouts give equal texts."""
     told = layout.commands(np.ones((1, len(layout.contacts))), None)[0]
-    rest = np.concatenate([HOME, np.zeros(6 + len(told))])
+    rest = np.concatenate([IDENTITY_POSE, np.zeros(6 + len(told))])
     return scene_text(
         SceneContent(
             comment=TRUE_MASS,
@@ -306,7 +308,7 @@ def held_text(layout: HeldLayout, physics: PhysicsSettings) -> str:
             physics=physics,
             rubbing=(0.0, 0.0, 0.0),
             holder=layout.holder,
-            tips=[(FINGERTIPS, (each, 0.0, 0.0)) for each in layout.friction.tolist()],
+            tips=[(FINGERTIP_BIT, (each, 0.0, 0.0)) for each in layout.friction.tolist()],
             palm=("palm" if isinstance(layout.holder, Slides) else "wrist", palm_armature(layout)),
             table_friction=float(layout.friction.max()),
             keys={"squeeze": {"qpos": rest, "ctrl": told}},

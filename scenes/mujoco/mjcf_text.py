@@ -19,16 +19,19 @@ from grasp_core.solvers.ties import first_best
 COMPILER = {"angle": "radian", "autolimits": "false", "inertiafromgeom": "false"}
 ESCAPED = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;"})
 """What stands in attributes for signs that have a meaning in XML."""
-MANY = 50
+MANY_NUMBERS = 50
 """Size of an array above which its text is kept for the next scene."""
-FINGERTIPS, TABLE, SHAPES = 1, 2, 1 << 20
+FINGERTIP_BIT, TABLE_BIT, SHAPE_BIT = 1, 2, 1 << 20
 """Bits of what fingertips touch, of what a table does, and of what the shapes of links may touch
 besides."""
 ORIGIN = (0.0, 0.0, 0.0)
-FREE = {"pos": ORIGIN, "limited": "false", "damping": 0.0, "stiffness": 0.0, "armature": 0.0,
+IDENTITY_POSE = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+"""Position and quaternion of a body that is where its scene has put it, (7,)."""
+IDENTITY_POSE.setflags(write=False)
+FREE_JOINT = {"pos": ORIGIN, "limited": "false", "damping": 0.0, "stiffness": 0.0, "armature": 0.0,
         "frictionloss": 0.0}  # fmt: skip
 """Attributes of a joint that moves freely."""
-TIP = {"contype": 0, "conaffinity": 0, "mass": 0.0, "group": 0, "rgba": (0.8, 0.25, 0.2, 1.0)}
+TIP_LOOK = {"contype": 0, "conaffinity": 0, "mass": 0.0, "group": 0, "rgba": (0.8, 0.25, 0.2, 1.0)}
 """Attributes of a fingertip that touches nothing."""
 
 
@@ -151,7 +154,7 @@ def as_text(value: object) -> str:
     if type(value) in (float, int):  # the most frequent ones, and an array would take longer
         return repr(value)
     numbers: Array | Indices = np.asarray(value)
-    if numbers.size > MANY:
+    if numbers.size > MANY_NUMBERS:
         return _many(numbers.tobytes(), numbers.dtype.str)
     return _separated(numbers)
 

@@ -23,19 +23,21 @@ from grasp_core.hands.hand import Hand, HandFinger
 from grasp_core.hands.reach import HandReach
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
-from scenes.mujoco.chains import Chains, Weld, hand_inertials
-from scenes.mujoco.closure_scene import SQUEEZE, arrange
+from scenes.mujoco.chains import HandChains, Weld, hand_inertials
+from scenes.mujoco.closure_scene import GENTLE_SQUEEZE, arrange
+from scenes.mujoco.fingertips import Slides
 from scenes.mujoco.hand_scenes import build_hand_scene
-from scenes.mujoco.mjcf_text import FINGERTIPS, SHAPES, SceneText, quaternion
-from scenes.mujoco.scene_text import HOME, SceneContent, SceneObject, Slides, scene_text
+from scenes.mujoco.mjcf_text import FINGERTIP_BIT, IDENTITY_POSE, SHAPE_BIT, SceneText, quaternion
+from scenes.mujoco.scene_text import SceneContent, SceneObject, scene_text
 from scenes.mujoco.surface import touched_solids
-from scenes.settings import FingerSettings, PhysicsSettings
+from scenes.mujoco_options import PhysicsSettings
+from scenes.settings import FingerSettings
 
-COMMENT = (
+TESTED_COMMENT = (
     "The test of another tool: the object has the mass that the test states, and no gravity. "
     "Servos stand open at the start, and are told to close and to squeeze."
 )
-ORIGIN = np.zeros((1, 3))
+CENTER_OF_MASS = np.zeros((1, 3))
 TIP_MASS_KG = 0.05
 """Mass of a fingertip with the part of its finger that moves with it."""
 OPEN_M, OPEN_SIZES = 0.01, 0.25
@@ -135,9 +137,9 @@ class TestedObject:
             most_push_n=None,
         )  # fmt: skip
         away = min(OPEN_M, OPEN_SIZES * layout.grasp_size_m)
-        opened, squeeze = np.tile([-away, 0.0, 0.0], count), layout.squeeze / SQUEEZE
+        opened, squeeze = np.tile([-away, 0.0, 0.0], count), layout.squeeze / GENTLE_SQUEEZE
         return self._held(
-            holder, [FINGERTIPS] * count, pushes_n=squeeze[:, 0], opened=opened,
+            holder, [FINGERTIP_BIT] * count, pushes_n=squeeze[:, 0], opened=opened,
             shut=np.zeros_like(opened), squeezing=to_digits(squeeze / stiffness).ravel(),
             fingers=tuple((name,) for name in holder.tip_names),
         )  # fmt: skip
@@ -148,7 +150,7 @@ class TestedObject:
         palms[:, :3, 3] -= self.body.center_of_mass
         used = [place for place, finger in enumerate(hand.fingers) if not _covered(finger)]
         step_s, tips = self.physics.timestep, [hand.fingers[place].tip for place in used]
-        chains = Chains(
+        chains = HandChains(
             hand=hand, angles=np.zeros(len(hand.joints)),
             palm_pose=servos.root if free else palms[1], used_fingers=tuple(used),
             limits=postures.limits_n_m, servo=servos.stiffness_n_m_per_rad,
@@ -158,7 +160,7 @@ class TestedObject:
         )  # fmt: skip
         opened, shut, squeezing = np.hstack([_roots(palms, servos), to_digits(postures.joints)])
         return self._held(
-            chains, [FINGERTIPS if tip.corners is None else SHAPES for tip in tips],
+            chains, [FINGERTIP_BIT if tip.corners is None else SHAPE_BIT for tip in tips],
             pushes_n=postures.pushes_n, opened=opened, shut=shut, squeezing=squeezing,
             fingers=tuple(tuple(link.name for link in finger.links) for finger in hand.fingers),
             axes=postures.axes,
@@ -175,10 +177,10 @@ class TestedObject:
         pushes = scene.layout.squeeze[:, 0]
         return Postures(np.tile(palm, (3, 1, 1)), joints, pushes, scene.hand.limits)
 
-    def _held(self, holder: Slides | Chains, bits: Sequence[int], **told: Any) -> TestedScene:
+    def _held(self, holder: Slides | HandChains, bits: Sequence[int], **told: Any) -> TestedScene:
         """Write the scene of a holder whose fingertips touch by bits, and what it is told."""
         body, physics = self.body, self.physics
-        found = touched_solids(body, ORIGIN, 2.0 * body.radius)
+        found = touched_solids(body, CENTER_OF_MASS, 2.0 * body.radius)
         held = SceneObject(
             name=body.name,
             vertices=to_digits(body.vertices - body.center_of_mass),
@@ -189,12 +191,12 @@ class TestedObject:
             inertia_kg_m2=to_digits(self.mass_kg / body.volume * body.inertia),
         )
         rubbing, opened = physics.rubbing(self.friction), told["opened"]
-        pose = 7 if isinstance(holder, Chains) and holder.weld is not None else 0
-        key = {"qpos": np.concatenate([HOME, opened]), "ctrl": opened[pose:]}
+        pose = 7 if isinstance(holder, HandChains) and holder.weld is not None else 0
+        key = {"qpos": np.concatenate([IDENTITY_POSE, opened]), "ctrl": opened[pose:]}
         moved = {"mpos": opened[:3], "mquat": opened[3:7]} if pose else {}
         content = SceneContent(
-            comment=COMMENT, held=held, physics=physics, rubbing=rubbing, holder=holder,
-            tips=[(each, rubbing) for each in bits], bits=FINGERTIPS | SHAPES,
+            comment=TESTED_COMMENT, held=held, physics=physics, rubbing=rubbing, holder=holder,
+            tips=[(each, rubbing) for each in bits], bits=FINGERTIP_BIT | SHAPE_BIT,
             keys={"open": key | moved},
         )  # fmt: skip
         return TestedScene(

@@ -26,47 +26,43 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.by_value import ByValue
+from scenes.mujoco.fingertips import Slides
 from scenes.mujoco.mjcf_text import (
     COMPILER,
-    FINGERTIPS,
-    FREE,
+    FINGERTIP_BIT,
+    FREE_JOINT,
     ORIGIN,
-    TABLE,
-    TIP,
+    TABLE_BIT,
     Element,
     Parts,
     add_comment,
     add_element,
-    add_servo,
     document,
     element,
-    placed,
     printable,
     six_of,
 )
 from scenes.mujoco.version_gaps import known_flags
-from scenes.settings import PhysicsSettings
+from scenes.mujoco_options import PhysicsSettings
 
 if TYPE_CHECKING:
-    from scenes.mujoco.chains import Chains
+    from scenes.mujoco.chains import HandChains
 
-SECTIONS = ("asset", "worldbody", "equality", "contact", "actuator", "keyframe")
-EXACT = {"midphase": "disable", "island": "disable"}
+SCENE_SECTIONS = ("asset", "worldbody", "equality", "contact", "actuator", "keyframe")
+FLAGS_OF_EXACT = {"midphase": "disable", "island": "disable"}
 """Flags of scenes in which fingertips touch the object's own surface. MuJoCo's search for pairs
 within two bodies misses contacts that are less deep than a ten-thousandth of the object, as all are
 here. Its search for parts that do not touch each other costs time, and finds one part."""
-TOUCH = 1e-7
+TOUCH_DEPTH = 1e-7
 """Depth of fingertips in the object's surface at the start, in object radii. The simulator stores
 meshes in single precision, which moves surfaces by up to 3e-8. A fingertip that does not touch yet
 would arrive with speed, and one that is much deeper is pushed out, which turns objects that two
 others hold and it hardly presses."""
-TOUCHED = {"conaffinity": 0, "mass": 0.0, "group": 2, "rgba": (0.9, 0.6, 0.2, 0.3)}
+SOLID_LOOK = {"conaffinity": 0, "mass": 0.0, "group": 2, "rgba": (0.9, 0.6, 0.2, 0.3)}
 """Attributes of a solid that fingertips touch, shown as glass of another colour."""
-HOME = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
-"""Joint position of the object where the scene has put it."""
 AWAY = 100.0
 """Distance of the table until it is needed, in object radii."""
-PALM = ("x", "y", "z", "about_x", "about_y", "about_z")
+PALM_JOINTS = ("x", "y", "z", "about_x", "about_y", "about_z")
 """Endings of the names of the palm's slides and hinges, in the order of its joints."""
 PALM_SHARE = 1e-3
 """Mass of the palm itself, relative to the object's: a moving body must have one."""
@@ -93,96 +89,6 @@ class SceneObject(ByValue):
     """Inertia about `center`, along the world axes, (3, 3) [kg m^2]."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False, kw_only=True)
-class Slides(ByValue):
-    """Fingertips on slides, each of which has a servo: a spring with a damper."""
-
-    tip_centers: Array
-    """Centres of the fingertips at their contacts, (k, 3) [m]."""
-    axes: Array
-    """Columns: directions of each fingertip's slides, (k, 3, 3)."""
-    tip_radii: Array
-    tip_mass_kg: float
-    stiffness: Array
-    """Stiffness of each fingertip's servos, (k, 3) [N/m]; (k, 0) for rigid ones, which have no
-    slides."""
-    damping: Array
-    """Coefficients of the dampers, of the same shape [N s/m]."""
-    names: tuple[str, ...] = ("normal", "tangent1", "tangent2")
-    """Endings of the names of a fingertip's slides."""
-    most_push_n: float | None = None
-    """Largest push along the first slide [N]."""
-
-    @property
-    def tip_names(self) -> tuple[str, ...]:
-        """Return the names of the fingertips' shapes in the scene."""
-        return tuple(f"finger{finger}" for finger in range(len(self.tip_radii)))
-
-    @property
-    def servo(self) -> Array:
-        """Return the stiffness of all servos, (3k,) [N/m]."""
-        return self.stiffness.ravel()
-
-    @property
-    def above_table(self) -> tuple[Array, Array]:
-        """Return balls that a table must not meet: middles (n, 3) and radii (n,) [m]."""
-        return self.tip_centers, self.tip_radii
-
-    def tips(self, joints: Array) -> Array:
-        """Compute where the centres of the fingertips are, (n, k, 3) [m], at slides (n, 3k) [m]."""
-        slides = joints.reshape(len(joints), *self.stiffness.shape)
-        return self.tip_centers + np.einsum("kij,nkj->nki", self._used_axes, slides)
-
-    def efforts(self, forces: Array) -> Array:
-        """Compute how servos push, (n, 3k) [N], for contact forces on the object, (n, k, 3) [N]."""
-        pushes = np.einsum("kij,nki->nkj", self._used_axes, forces)
-        return pushes.reshape(len(forces), self.stiffness.size)
-
-    def joints(self, reached: Array) -> Array:
-        """Find the positions of the slides, (3k,), that move tips along their axes, (k, 3) [m]."""
-        return reached.ravel()
-
-    def seen(self, joints: Array, loads: Array, turned: Array) -> tuple[Array, Array, Array | None]:
-        """See what fingers did in n samples, as the palm sees it.
-
-        Gives displacements of fingertips, (n, k, 3) [m], and contact forces on the object,
-        (n, k, 3) [N], along the axes, and orientations of fingertips, (n, k, 3, 3), or None
-        where they do not turn.
-        """
-        shape = (len(turned), *self.stiffness.shape)
-        return joints.reshape(shape), -loads.reshape(shape), None
-
-    def add_to(
-        self, parts: Parts, parent: Element, touching: Sequence[dict[str, Any]],
-        _contact: dict[str, Any],
-    ) -> None:  # fmt: skip
-        """Add fingertips and servos to a body.
-
-        Takes attributes of each fingertip that touches, and those of all other contacts.
-        """
-        inertia = 0.4 * self.tip_mass_kg * self.tip_radii**2
-        for finger, name in enumerate(self.tip_names):
-            place = placed(self.tip_centers[finger], self.axes[finger])
-            body = add_element(parent, "body", {"name": name, "gravcomp": 1.0} | place)
-            springs = zip(
-                self.names, np.eye(3), self.stiffness[finger], self.damping[finger], strict=False
-            )
-            for number, (ending, axis, stiffness, damping) in enumerate(springs):
-                joint = {"name": f"{name}_{ending}", "type": "slide", "axis": axis}
-                add_element(body, "joint", FREE | joint)
-                most = None if number else self.most_push_n
-                limits = None if most is None else (0.0, most)
-                add_servo(parts["actuator"], f"{name}_{ending}", stiffness, damping, limits)
-            own = {"pos": ORIGIN, "mass": self.tip_mass_kg, "diaginertia": (inertia[finger],) * 3}
-            add_element(body, "inertial", own)
-            ball = {"name": name, "type": "sphere", "size": self.tip_radii[finger]}
-            add_element(body, "geom", ball | TIP | touching[finger])
-
-    @property
-    def _used_axes(self) -> Array:
-        return self.axes[:, :, : self.stiffness.shape[1]]
-
-
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class SceneContent:
     """What a scene consists of."""
@@ -192,10 +98,10 @@ class SceneContent:
     physics: PhysicsSettings
     rubbing: tuple[float, float, float]
     """Coefficients of the object's surface as in MJCF; of two that touch, the larger counts."""
-    holder: "Slides | Chains"
+    holder: "Slides | HandChains"
     tips: Sequence[tuple[int, tuple[float, float, float]]]
     """Bits of what the holder's fingertips touch, and their coefficients."""
-    bits: int = FINGERTIPS
+    bits: int = FINGERTIP_BIT
     """Bits of what touches the object's surface."""
     weightless: bool = False
     pads: Sequence[dict[str, Any]] = ()
@@ -210,12 +116,13 @@ class SceneContent:
 
 def scene_text(scene: SceneContent) -> str:
     """Write the MJCF text of a scene; equal values give equal texts."""
-    it, physics, parts = scene.held, scene.physics, {tag: element(tag, {}) for tag in SECTIONS}
+    it, physics = scene.held, scene.physics
+    parts = {tag: element(tag, {}) for tag in SCENE_SECTIONS}
     root = element("mujoco", {"model": printable(it.name)})
     add_comment(root, scene.comment)
     add_element(root, "compiler", COMPILER)
     option = add_element(root, "option", physics.options())
-    flags, lacking = known_flags(physics.flags() | ({} if scene.pads else EXACT))
+    flags, lacking = known_flags(physics.flags() | ({} if scene.pads else FLAGS_OF_EXACT))
     add_element(option, "flag", flags)
     for each in lacking:
         add_comment(root, each)
@@ -243,7 +150,7 @@ def _add_object(scene: SceneContent, parts: Parts) -> None:
     add_element(body, "freejoint", {"name": "object"})
     own = {"pos": it.center, "mass": it.object_kg, "fullinertia": six_of(it.inertia_kg_m2)}
     add_element(body, "inertial", own)
-    hull = 0 if scene.table_friction is None else TABLE
+    hull = 0 if scene.table_friction is None else TABLE_BIT
     hull |= scene.bits if it.solids is None else 0
     shown = {"name": "object", "type": "mesh", "mesh": "object", "contype": hull, "conaffinity": 0,
              "group": 1, "mass": 0.0, "rgba": (0.55, 0.62, 0.70, 0.6)}  # fmt: skip
@@ -253,10 +160,10 @@ def _add_object(scene: SceneContent, parts: Parts) -> None:
         mesh = {"name": name, "inertia": "shell", "vertex": corners}
         add_element(parts["asset"], "mesh", mesh)
         solid = {"name": name, "type": "mesh", "mesh": name, "contype": scene.bits}
-        add_element(body, "geom", solid | TOUCHED | touching)
+        add_element(body, "geom", solid | SOLID_LOOK | touching)
     for finger, pad in enumerate(scene.pads):
         box = {"name": f"pad{finger}", "type": "box"}
-        add_element(body, "geom", box | pad | TOUCHED | touching)
+        add_element(body, "geom", box | pad | SOLID_LOOK | touching)
 
 
 def _add_table(scene: SceneContent, world: Element) -> None:
@@ -266,7 +173,7 @@ def _add_table(scene: SceneContent, world: Element) -> None:
     away = AWAY * radius * np.array([0.0, 0.0, -1.0])
     table = add_element(world, "body", {"name": "table", "mocap": "true", "pos": away})
     plane = {"name": "table", "type": "plane", "size": (10.0 * radius,) * 2 + (0.01,),
-             "contype": 0, "conaffinity": TABLE, "friction": (scene.table_friction, 0.0, 0.0),
+             "contype": 0, "conaffinity": TABLE_BIT, "friction": (scene.table_friction, 0.0, 0.0),
              "rgba": (0.8, 0.78, 0.74, 1.0)}  # fmt: skip
     add_element(table, "geom", plane | scene.physics.contact())
 
@@ -277,10 +184,10 @@ def _base(scene: SceneContent, world: Element) -> Element:
         return world
     name, armatures = scene.palm
     body = add_element(world, "body", {"name": name, "pos": ORIGIN, "gravcomp": 1.0})
-    for place, (way, armature) in enumerate(zip(PALM, armatures, strict=True)):
+    for place, (way, armature) in enumerate(zip(PALM_JOINTS, armatures, strict=True)):
         kind, axis = ("slide", "hinge")[place // 3], np.eye(3)[place % 3]
         joint = {"name": f"palm_{way}", "type": kind, "axis": axis, "armature": armature}
-        add_element(body, "joint", FREE | joint)
+        add_element(body, "joint", FREE_JOINT | joint)
     mass = PALM_SHARE * scene.held.object_kg
     inertia = (mass * scene.held.radius_m**2,) * 3
     add_element(body, "inertial", {"pos": ORIGIN, "mass": mass, "diaginertia": inertia})

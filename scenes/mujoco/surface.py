@@ -27,11 +27,11 @@ from grasp_core.objects.on_faces import nearest_on_triangles
 from grasp_core.objects.polyhedron import Polyhedron, is_convex
 from grasp_core.objects.surface import areas_and_normals
 
-TOUCHING = 1e-9
+OVERLAP_SLACK = 1e-9
 """How far the two may overlap along an axis and count as touching, in object radii."""
 SLOPE = 0.05
 """Depth of a pyramid per distance of its base's middle from the nearest edge."""
-THIN = 1e-5
+THIN_PIECE = 1e-5
 """Width of a piece below which it is left out, in object radii; neighbours close the gap."""
 
 
@@ -48,7 +48,7 @@ def touched_solids(body: Polyhedron, near: Array, reach: float) -> tuple[Array, 
     widest = float(np.linalg.norm(triangles - middles[:, None], axis=2).max())
     spatial: Any = importlib.import_module("scipy.spatial")
     tree, kernel = spatial.KDTree(middles), compiled("scenes.mujoco.clearance_kernel")
-    found, thin, slack = list[Array](), THIN * body.radius, TOUCHING * body.radius
+    found, thin, slack = list[Array](), THIN_PIECE * body.radius, OVERLAP_SLACK * body.radius
     pieces = list(_flat_pieces(body))
     for corners, inward in compress(pieces, _distances(pieces, near) <= reach):
         middle = corners.mean(axis=0)

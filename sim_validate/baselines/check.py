@@ -22,9 +22,8 @@ from scenes.settings import FingerSettings
 from sim_validate.baselines.baseline import Baseline, How, KeptGrasp, write_baseline
 from sim_validate.baselines.compare import WORDS, Carried, Finding, Status, bands_between, compare
 from sim_validate.baselines.part import Present
-from sim_validate.closure.validate import Job
+from sim_validate.closure.validate import checked_for, proved_and_tested
 from sim_validate.closure.verdict import Verdict, WrenchVerdict
-from sim_validate.engine.gate import require_faithful
 from sim_validate.engine.setup import (
     AXIS_NAMES,
     WEAKEST,
@@ -79,18 +78,21 @@ def measured(
     where = _as_seen_from(baseline, grasps)
     if not chosen:
         raise InputError(f"{where}: expected at least one grasp to simulate, found none")
-    require_faithful(how.setup, saved.friction, saved.body.radius)
-    job = Job(saved.body, saved.friction, how.agenda, how.setup)
     settings = None if how.execution is None else how.execution.for_body(saved.body)
     executing = [
         ExecutionJob(saved.body, grasp, saved.friction, settings, enough=False)
         for grasp in chosen
         if settings is not None
     ]
-    job = job.prepared(len(chosen), processors)
     count, total = processes(len(chosen), processors), len(chosen) + len(executing)
+    setup = replace(how.setup.for_body(saved.body), threads=processors // count)
+    gate = checked_for(saved.body, saved.friction, how.agenda, setup)
+    validating = partial(
+        proved_and_tested, saved.body, friction=saved.friction, gate=gate, agenda=how.agenda,
+        setup=setup,
+    )  # fmt: skip
     answers = chain(
-        each(partial(_or_refusal, job, ""), chosen, jobs=count),
+        each(partial(_or_refusal, validating, ""), chosen, jobs=count),
         each(partial(_or_refusal, executed_grasp, "the execution is refused: "), executing,
              jobs=processors),
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Runs `validate`, which writes verdicts on grasps, and `doctor`, which checks an installation."""
+"""Simulates the grasps of a file, and runs `doctor`, which checks an installation."""
 
 import math
 import os
@@ -7,14 +7,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TypeAlias
 
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.compiled import compiled, state_of
 from grasp_core.cones.pyramids import inscribed_share
 from grasp_core.families.placements import RADIUS_GIVEN_UP
-from grasp_core.files.records import RecordFile, record_of
+from grasp_core.files.records import record_of
 from grasp_core.planning.planner import plan
 from grasp_core.planning.reach import Finger
 from grasp_core.planning.result import Plan
@@ -23,13 +22,14 @@ from grasp_core.settings import extended
 from grasp_core.stopping import never
 from scenes.drawing.clips import GraphicsError, available_graphics, has_display, remedy
 from scenes.example_objects import example_object
-from sim_validate.closure.validate import Job, validate, validated
+from sim_validate.closure.validate import checked_for, validate, validated
 from sim_validate.closure.verdict import Verdict, Verdicts, trace_arrays
-from sim_validate.commands import flags, simulation_flags
+from sim_validate.commands import flags
 from sim_validate.commands.console import TABLE_ROWS, Reporter, warn_of
 from sim_validate.commands.exit_codes import Exit, FlagsError
 from sim_validate.commands.simulation_flags import Testing
-from sim_validate.engine.gate import measured_gate, require_faithful
+from sim_validate.engine.gate import ClosureCase
+from sim_validate.engine.known_cases import measured
 from sim_validate.engine.setup import (
     Agenda,
     Setup,
@@ -40,37 +40,10 @@ from sim_validate.engine.setup import (
 )
 from sim_validate.engine.traces import Outcome
 from sim_validate.files.array_files import write_arrays
-from sim_validate.files.output_folders import alone_in
 from sim_validate.files.results_folder import remove_results
-from sim_validate.planning.asked_objects import asked_grasps
 from sim_validate.processes.compiling import EVERYTHING, compile_loops
 from sim_validate.processes.workers import available_cores
 from sim_validate.settings import ChosenTrials, Noise
-
-Judge: TypeAlias = Callable[[Plan, Setup], tuple[Exit, RecordFile]]
-"""Judges grasps by another test; gives the exit code and its results."""
-
-
-def validate_file(
-    command: simulation_flags.ValidateFlags, reporter: Reporter, judge: Judge | None = None
-) -> int:
-    """Simulate the grasps of a file, or let another test judge them, and report which hold."""
-    chosen = asked_grasps(
-        command.grasps, reporter, friction=command.friction, seed=command.seed, limit=command.limit
-    )
-    if chosen is None:
-        return Exit.NONE
-    setup, agenda = prepared(command.testing, chosen.finger, chosen.seed, command.out)
-    jobs, folder = command.testing.jobs, command.out
-    with alone_in(folder):
-        if judge is not None:
-            code, found = judge(chosen, setup)
-        else:
-            code, found = simulate_grasps(
-                chosen, setup, agenda, jobs=jobs, folder=folder, reporter=reporter
-            )
-    reporter.document(found.document())
-    return code
 
 
 def simulate_grasps(
@@ -78,12 +51,11 @@ def simulate_grasps(
     reporter: Reporter, stop: Callable[[], bool] = never,
 ) -> tuple[Exit, Verdicts]:  # fmt: skip
     """Simulate grasps; return the exit code and the verdicts."""
-    gate = require_faithful(setup, saved.friction, saved.body.radius)
+    gate = checked_for(saved.body, saved.friction, agenda, setup)
     for check in gate.checks:
         reporter.detail(str(check))
     if folder:
         remove_results(folder, Verdicts.FILE)
-    job = Job(saved.body, saved.friction, agenda, setup)
 
     def kept(verdict: Verdict) -> bool:
         if folder and agenda.keep_traces:
@@ -93,7 +65,7 @@ def simulate_grasps(
     collect = partial(Verdicts.of, saved.body, saved.friction, gate)
     found = reporter.collected(
         "simulating",
-        validated(job, saved.grasps, jobs),
+        validated(saved.body, saved.grasps, saved.friction, gate, agenda, setup, jobs),
         len(saved.grasps),
         ("held", kept),
         collect,
@@ -174,7 +146,7 @@ def check_installation(command: flags.DoctorFlags, reporter: Reporter) -> int:
     if command.compile:
         reporter.say("compiling all inner loops, which takes two minutes of one core")
         compile_loops(EVERYTHING, available_cores())
-    body, gate = example_object("tetrahedron"), measured_gate(Setup())
+    body, gate = example_object("tetrahedron"), measured(ClosureCase.of(Setup()))
     grasp = plan(body).grasps[0]
     verdict = validate(body, grasp) if gate.passed else None
     cone = math.tan(grasp.force_cones[0].half_angle) * inscribed_share()

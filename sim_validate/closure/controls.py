@@ -30,15 +30,16 @@ from grasp_core.forces.contact_forces import least_friction_forces
 from grasp_core.kinds import FLAT, Friction
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
-from scenes.mujoco.fingertips import clashes, fitting_radius
-from sim_validate.engine.limits_and_friction import Rig, squeezed
+from scenes.mujoco.fingertip_room import clashes, fitting_radius
+from sim_validate.engine.rig import Rig, squeezed
+from sim_validate.engine.schedules import TrialLoad
 from sim_validate.engine.setup import Agenda, Setup
-from sim_validate.engine.simulate import Bench, Load
+from sim_validate.engine.stepping import Bench
 from sim_validate.engine.traces import LET_GO, HoldVerdict, Outcome, Trace, judge
 
 FRICTION_SHARE = 0.9
 """Friction of the low-friction control, relative to the lowest at which the grasp is in closure."""
-LEAST_FRICTION = 1e-4
+LEAST_CONTROL_FRICTION = 1e-4
 """Lowest friction of a negative control; the simulator's own limit is 1e-5."""
 SEARCH = 64
 """Number of random displacements of the contacts that are tried to lose force closure."""
@@ -78,7 +79,7 @@ def negative_controls(
     lower = FRICTION_SHARE * grasp.critical_friction
     low_friction = _refuted("low_friction", grasp.contacts, lower, setup)
     candidates = (
-        low_friction if lower >= LEAST_FRICTION else iter(()),
+        low_friction if lower >= LEAST_CONTROL_FRICTION else iter(()),
         _fingers_removed(grasp, friction, setup),
         _contacts_moved(body, grasp, friction, setup, np.random.default_rng(seed)),
     )
@@ -99,7 +100,7 @@ def _fingers_removed(grasp: Grasp, friction: float, setup: Setup) -> Iterator[Co
         lower = math.inf
         with suppress(SolverError, UndecidedError):
             lower = FRICTION_SHARE * setup.critical_friction(rest)
-        if LEAST_FRICTION <= lower <= friction:
+        if LEAST_CONTROL_FRICTION <= lower <= friction:
             yield from _refuted("fingers_removed", rest, lower, setup)
     for rest in combinations(grasp.contacts, 2):
         yield from _refuted("fingers_removed", rest, friction, setup)
@@ -143,7 +144,7 @@ class ControlLoad:
     """A load under which a negative control must let go of the object."""
 
     name: str
-    load: Load
+    load: TrialLoad
     settling: float  # friction coefficient while the object settles, before the load is applied
     required_friction: float | None
 
@@ -183,7 +184,7 @@ class ControlVerdict(Declared):
 def try_control(body: Polyhedron, control: Control, agenda: Agenda, setup: Setup) -> ControlVerdict:
     """Simulate a negative control under the loads that it must not hold."""
     rig, loads = control_case(body, control, setup)
-    traces = rig.hold([each.load for each in loads], [each.settling for each in loads])
+    traces = rig.traced(rig.holds([each.load for each in loads], [each.settling for each in loads]))
     layout = rig.bench.scene.layout
     tried = tuple(
         ControlTrial(
@@ -229,4 +230,4 @@ def _planned(
     )  # fmt: skip
     needed = None if needed is None else rounded(needed)
     settling = setup.hold.settling_friction * max(control.friction, needed or 0.0)
-    return ControlLoad(name, Load(wrench, to_digits(forces)), settling, needed)
+    return ControlLoad(name, TrialLoad(wrench, to_digits(forces)), settling, needed)

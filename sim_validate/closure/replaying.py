@@ -24,19 +24,21 @@ from grasp_core.planning.result import Plan
 from grasp_core.records.grasps_json import load_grasps
 from grasp_core.values import Contact, Grasp
 from scenes.mujoco.closure_scene import Scene
-from scenes.mujoco.fingertips import clashes
+from scenes.mujoco.fingertip_room import clashes
 from sim_validate.closure.controls import Control, ControlLoad, ControlTrial, control_case
-from sim_validate.closure.validate import OPEN, disturbed, for_repeats, noisy_case, untouching
+from sim_validate.closure.validate import OPENED_BY_NOISE, for_repeats, noisy_case, off_faces
 from sim_validate.closure.verdict import Verdict, WrenchVerdict, load_verdicts
-from sim_validate.engine.limits_and_friction import Analysis, PlannedLoad, Rig, Watched, closed_on
+from sim_validate.engine.misplacement import disturbed
+from sim_validate.engine.planned_loads import LoadPlanner, PlannedLoad
+from sim_validate.engine.rig import Rig, Watched, closed_on
+from sim_validate.engine.schedules import TrialLoad
 from sim_validate.engine.setup import WEAKEST, Agenda, Setup
-from sim_validate.engine.simulate import Load
 from sim_validate.engine.traces import HoldVerdict, Outcome, judge
 from sim_validate.planning.asked_objects import grasp_with_id, some
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
+class WantedTrial:
     """Which contact set of a file is to be simulated again."""
 
     grasp: str | None = None
@@ -76,7 +78,7 @@ class Replayed(Declared):
     """The motion and outcome of one trial that was simulated again."""
 
     name: Annotated[str, Field(alias="wrench")]
-    load: Annotated[Load, UNRECORDED]
+    load: Annotated[TrialLoad, UNRECORDED]
     predicted_limit: OrInfinity | None
     """Largest multiple of the wrench that is resisted by analysis; None for contacts without force
     closure."""
@@ -94,7 +96,7 @@ class Replayed(Declared):
         return self.load.wrench
 
 
-def recorded_in(source: Path, wanted: Wanted) -> Recorded:
+def recorded_in(source: Path, wanted: WantedTrial) -> Recorded:
     """Read a contact set from a `verdicts.json`, or from the folder of a run."""
     path = source / VERDICTS if source.is_dir() else source
     found = load_verdicts(path)
@@ -120,7 +122,7 @@ def recorded_in(source: Path, wanted: Wanted) -> Recorded:
     return replace(recorded, mujoco=found.gate.mujoco)
 
 
-def of_verdict(path: Path, saved: Plan, verdict: Verdict, wanted: Wanted) -> Recorded:
+def of_verdict(path: Path, saved: Plan, verdict: Verdict, wanted: WantedTrial) -> Recorded:
     """Read a contact set, and how its trials ended, from the verdict on one grasp."""
     grasp = grasp_with_id(path, saved, wanted.grasp)
     if contacts_sha256(grasp.contacts) != verdict.contacts_sha256:
@@ -185,12 +187,13 @@ def replayed(recorded: Recorded, wrench: str | None = None) -> Replayed:
         known = ", ".join(limits)
         raise InputError(f"{recorded.name}: no wrench is named {name!r}; choose from {known}")
     settling = [held.settling] if isinstance(held, ControlLoad) else None
-    watched = rig.watch(held.load, settling)
+    trials = rig.holds([held.load], settling)
+    watched = rig.watch(trials[0])
     layout = rig.bench.scene.layout
     amiss = clashes(recorded.body, *stacked(landed), layout.drive.radius_m) if landed else ()
     if recorded.grasp is not None and recorded.trial is None:
-        amiss = amiss or untouching(rig.bench, recorded.body, recorded.grasp)
-    (ended,) = rig.hold([held.load], settling)
+        amiss = amiss or off_faces(rig.bench, recorded.body, recorded.grasp)
+    (ended,) = rig.traced(trials)
     return Replayed(
         name=name,
         load=held.load,
@@ -211,7 +214,7 @@ def _case(recorded: Recorded) -> tuple[Rig, Loads, tuple[Contact, ...]]:
         return _opened(body, recorded.control, contacts, friction, setup)
     scene = setup.scene(body, recorded.grasp or contacts, friction)
     rig = closed_on(scene, setup, friction)
-    planned = Analysis(body, contacts, friction, setup, None).planned(rig.idle, recorded.agenda)
+    planned = LoadPlanner(body, contacts, friction, setup, None).planned(rig.idle, recorded.agenda)
     if recorded.trial is None or recorded.grasp is None:
         return rig, planned, contacts
     setup, agenda = for_repeats(setup, scene), recorded.agenda
@@ -222,7 +225,7 @@ def _case(recorded: Recorded) -> tuple[Rig, Loads, tuple[Contact, ...]]:
             f"{case.missed[0]} miss its face"
         )
     if not setup.closure(case.contacts, case.friction).closed:
-        return _opened(body, OPEN, case.contacts, case.friction, setup)
+        return _opened(body, OPENED_BY_NOISE, case.contacts, case.friction, setup)
     rig, heavy = noisy_case(body, case, [(each.name, each.load.wrench) for each in planned], setup)
     return rig, heavy, case.landed
 

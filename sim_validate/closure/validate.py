@@ -6,68 +6,56 @@ friction is found in simulation too, and on request the limits. The grasp is con
 wrenches hold. The run can be trusted when the simulator is faithful (`gate`) and no control holds.
 
 On request the trials are repeated with seeded noise, to count how often the grasp still holds.
-The fingers come along their planned lines, but the object is displaced. Each finger touches where
-its line enters the same face, if the line does (on a curved object, the surface near the planned
-contact). There the surface normal leans a little from that of the model. Friction is the same at
-all contacts; mass scales the simulated mass and every load. Loads turn with the object.
-
-All noise is drawn from normal distributions; friction and mass are multiplied by the exponential of
-the drawn number. The draws of a trial depend only on the seed and the trial's number. So every
-grasp gets the same draws, and a larger deviation only scales them.
+The fingers come along their planned lines, but the object is displaced (see `misplacement`). Where
+they touch, the surface normal leans a little from that of the model. Friction is the same at all
+contacts; mass scales the simulated mass and every load; both are multiplied by the exponential of a
+drawn number. Loads turn with the object. Every grasp gets the same draws.
 
 The analysis says which loads the disturbed grasp resists, and simulation applies them all with
 forces planned for the disturbed contacts. So a repeat asks whether the grasp can still hold, not
 whether fingers notice the change. Contacts that noise takes out of force closure are tested as a
-negative control: they must let go. Analysis and simulation must agree in every repeat. The share
+negative control: they must let go. LoadPlanner and simulation must agree in every repeat. The share
 that holds has a confidence interval.
 """
 
-import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import Any, TypeAlias
 
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.closure.contacts import contact_frames, stacked
-from grasp_core.errors import InputError, UndecidedError
+from grasp_core.closure.contacts import stacked
+from grasp_core.errors import InputError, UndecidedError, UnfaithfulError
 from grasp_core.kinds import Count, Friction, function, instance, several, value_of
-from grasp_core.objects.on_faces import check_body, check_on_faces, edge_distance, within
+from grasp_core.objects.on_faces import check_body, check_on_faces, edge_distance
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.planning.given_contacts import facets_of
-from grasp_core.values import Contact, Grasp
+from grasp_core.values import Grasp
 from scenes.mujoco.closure_scene import Scene
-from scenes.mujoco.fingertips import clashes
+from scenes.mujoco.fingertip_room import clashes
 from sim_validate.closure.controls import Control, ControlVerdict, negative_controls, try_control
 from sim_validate.closure.verdict import (
     AGREEMENT,
     NoisyTrial,
     Robustness,
-    Scale,
+    TrialScale,
     Verdict,
     WrenchVerdict,
 )
-from sim_validate.engine.gate import Gate, measured_gate, misplaced, require_faithful, require_touch
-from sim_validate.engine.limits_and_friction import (
-    Analysis,
-    CriticalFriction,
-    PlannedLoad,
-    Rig,
-    SimulatedLimit,
-    bisected_limits,
-    closed_on,
-    ramped_limits,
-    released_friction,
-)
+from sim_validate.engine.gate import ClosureCase
+from sim_validate.engine.known_cases import Gate, checked, untouching
+from sim_validate.engine.misplacement import Disturbed, disturbed
+from sim_validate.engine.planned_loads import LoadPlanner, PlannedLoad
+from sim_validate.engine.rig import Rig, closed_on
 from sim_validate.engine.setup import WEAKEST, Agenda, Setup
-from sim_validate.engine.simulate import Bench
-from sim_validate.engine.traces import LET_GO, HoldVerdict, Outcome, judge, rotated
+from sim_validate.engine.simulated_friction import CriticalFriction, released_friction
+from sim_validate.engine.simulated_limits import SimulatedLimit, bisected_limits, ramped_limits
+from sim_validate.engine.stepping import Bench
+from sim_validate.engine.traces import LET_GO, HoldVerdict, Outcome, judge
 from sim_validate.processes.own_faults import OWN_FAULTS
 from sim_validate.processes.workers import each, processes
-from sim_validate.settings import Noise
 
 
 def validate(
@@ -91,7 +79,38 @@ def validate(
         InputError: The contacts are not on the body's faces, or not closed at this friction.
         UnfaithfulError: The simulator fails its checks with these settings.
     """
-    return Job(body, friction, *asked_for(agenda, setup))(grasp)
+    agenda, setup = asked_for(agenda, setup)
+    setup = setup.for_body(body)
+    proved = proved_closed(body, grasp, friction, setup)
+    gate = checked_for(body, friction, agenda, setup)
+    return tested(body, proved, friction, gate, agenda, setup)
+
+
+def asked_for(agenda: Agenda | None, setup: Setup | None) -> tuple[Agenda, Setup]:
+    """Check which trials are asked for and how they are simulated; None stands for the defaults."""
+    return (
+        Agenda() if agenda is None else instance(agenda, Agenda, "agenda"),
+        Setup() if setup is None else instance(setup, Setup, "setup"),
+    )
+
+
+def proved_closed(body: Polyhedron, grasp: Grasp, friction: float, setup: Setup) -> Grasp:
+    """Prove that a grasp is closed on its faces; return it with its own critical friction."""
+    check_on_faces(body, grasp)
+    value_of(Friction, friction, "friction")
+    critical = setup.critical_friction(grasp)
+    if not (friction > critical and setup.closure(grasp, friction).closed):
+        raise InputError(
+            f"grasp {grasp.id}: force closure needs friction above {critical:.6g}, got {friction}"
+        )
+    return replace(grasp, critical_friction=critical)
+
+
+def checked_for(body: Polyhedron, friction: float, agenda: Agenda, setup: Setup) -> Gate:
+    """Check the simulator on known cases like the trials of an agenda."""
+    if agenda.repeats:  # their contacts lean, on pads
+        checked(ClosureCase.of(replace(setup, surface="pads"), friction, body.radius))
+    return checked(ClosureCase.of(setup.for_body(body), friction, body.radius))
 
 
 NOT_STARTED: dict[str, Any] = {"critical_friction": False, "limits": "none", "repeats": 0}
@@ -103,13 +122,12 @@ def tested(
 ) -> Verdict:
     """Test a grasp whose closure is proved, with a simulator that was checked before."""
     scene = setup.scene(body, grasp, friction)
-    layout, rig = scene.layout, closed_on(scene, setup, friction)
-    loads = Analysis(body, grasp.contacts, friction, setup, None).planned(rig.idle, agenda)
-    amiss = clashes(body, grasp.positions, grasp.normals, layout.drive.radius_m)
-    untouched = () if amiss else untouching(rig.bench, body, grasp)
-    if untouched:  # nothing that starts like this says anything about the grasp
-        agenda = replace(agenda, **NOT_STARTED)
-    wrenches = held_wrenches(rig, loads, agenda, amiss or untouched)
+    rig = closed_on(scene, setup, friction)
+    loads = LoadPlanner(body, grasp.contacts, friction, setup, None).planned(rig.idle, agenda)
+    amiss = clashes(body, grasp.positions, grasp.normals, scene.layout.drive.radius_m)
+    if not amiss and (amiss := off_faces(rig.bench, body, grasp)):
+        agenda = replace(agenda, **NOT_STARTED)  # nothing that starts like this says anything
+    wrenches = held_wrenches(rig, loads, agenda, amiss)
     critical = CriticalFriction(grasp.critical_friction)
     if agenda.critical_friction:
         with suppress(UndecidedError):
@@ -133,21 +151,16 @@ def tested(
         robustness=repeats,
         setup=setup,
         agenda=agenda,
-        scale=_scale(body, scene),
+        scale=TrialScale.of(body, scene.layout),
         gate=gate,
         scene=scene,
     )
 
 
-def untouching(bench: Bench[Scene], body: Polyhedron, grasp: Grasp) -> tuple[str, ...]:
+def off_faces(bench: Bench[Scene], body: Polyhedron, grasp: Grasp) -> tuple[str, ...]:
     """List the fingertips of a grasp that do not touch their faces at the start."""
     faces = zip(grasp.faces, grasp.positions, strict=True)
-    return misplaced(bench, [edge_distance(body.faces[face], point) for face, point in faces])
-
-
-def _scale(body: Polyhedron, scene: Scene) -> Scale:
-    at = scene.layout
-    return Scale(at.grasp_size_m, body.radius, at.object_kg, at.inertia_kg_m2, at.drive)
+    return untouching(bench, [edge_distance(body.faces[face], point) for face, point in faces])
 
 
 def held_wrenches(
@@ -158,7 +171,7 @@ def held_wrenches(
     What is `amiss` with the start, in words, makes all of them invalid.
     """
     limits = [planned.limit for planned in loads]
-    traces = rig.hold([planned.load for planned in loads])
+    traces = rig.traced(rig.holds([planned.load for planned in loads]))
     found: Sequence[SimulatedLimit | None] = [None] * len(limits)
     if agenda.limits != "none":
         search = ramped_limits if agenda.limits == "ramp" else bisected_limits
@@ -197,96 +210,17 @@ def simulated_critical_friction(
     if not np.isfinite(predicted):
         raise InputError(f"grasp {grasp.id}: no friction gives force closure; choose another grasp")
     friction = max(predicted, setup.friction.least_friction)
-    require_faithful(setup, radius_m=body.radius)
+    checked(ClosureCase.of(setup, radius_m=body.radius))
     scene = setup.scene(body, grasp, friction)
     bench = Bench(scene, threads=setup.threads, timeout_s=setup.timeout_s)
-    require_touch(bench)
+    if amiss := untouching(bench):
+        raise UnfaithfulError(amiss[0])
     found = released_friction(bench, grasp.positions, grasp.normals, predicted, setup)
     return np.inf if found.simulated is None else found.simulated
 
 
-def asked_for(agenda: Agenda | None, setup: Setup | None) -> tuple[Agenda, Setup]:
-    """Check which trials are asked for and how they are simulated; None stands for the defaults."""
-    return (
-        Agenda() if agenda is None else instance(agenda, Agenda, "agenda"),
-        Setup() if setup is None else instance(setup, Setup, "setup"),
-    )
-
-
-Progress: TypeAlias = Callable[[int, int, Verdict], object]
+VerdictProgress: TypeAlias = Callable[[int, int, Verdict], object]
 """Function that is told the number of grasps done, the number of all, and the last verdict."""
-
-
-@dataclass(frozen=True, slots=True)
-class Job:
-    """How grasps of one object are validated: what is sent once to each worker process."""
-
-    body: Polyhedron
-    friction: float
-    agenda: Agenda
-    setup: Setup
-    gate: Gate | None = None
-    """How the simulator did on the known cases, so that worker processes need not ask again."""
-
-    def prepared(self, count: int, processors: int) -> "Job":
-        """Check the simulator, and give each of some grasps an equal share of the processors."""
-        threads = max(1, processors // processes(count, processors))
-        gate = measured_gate(self.setup.for_body(self.body), self.friction, self.body.radius)
-        return replace(self, setup=replace(self.setup, threads=threads), gate=gate)
-
-    def __call__(self, grasp: Grasp) -> Verdict:
-        """Validate one grasp."""
-        body, friction = self.body, self.friction
-        check_on_faces(body, grasp)
-        setup = self.setup.for_body(body)
-        value_of(Friction, friction, "friction")
-        critical = setup.critical_friction(grasp)
-        closed = friction > critical
-        if not (closed and setup.closure(grasp, friction).closed):
-            raise InputError(
-                f"grasp {grasp.id}: force closure needs friction above {critical:.6g}, got "
-                f"{friction}"
-            )
-        gate = self.gate or measured_gate(setup, friction, body.radius)
-        gate.require("no grasp is certified")
-        if self.agenda.repeats:  # their contacts lean, on pads
-            on_pads = measured_gate(replace(setup, surface="pads"), friction, body.radius)
-            on_pads.require("no grasp is repeated with noise")
-        proved = replace(grasp, critical_friction=critical)
-        return tested(body, proved, friction, gate, self.agenda, setup)
-
-    def attempted(self, grasp: Grasp) -> Verdict:
-        """Validate one of several grasps; the reason why it cannot be is a verdict, too."""
-        try:
-            return self(grasp)
-        except OWN_FAULTS as error:
-            reason = str(error)
-        setup = self.setup.for_body(self.body)
-        scene = setup.scene(self.body, grasp, self.friction)  # refuses what suits no grasp
-        nothing = np.full(len(grasp.contacts), np.nan)
-        hold = HoldVerdict(Outcome.ERROR, reason, np.nan, np.nan, np.nan, nothing, None)
-        return Verdict(
-            id=grasp.id,
-            contacts=grasp.contacts,
-            friction=self.friction,
-            critical_friction=CriticalFriction(grasp.critical_friction),
-            wrenches=(WrenchVerdict(WEAKEST, np.zeros(6), 0.0, np.inf, hold),),
-            controls=(),
-            robustness=None,
-            setup=setup,
-            agenda=replace(self.agenda, controls=False, **NOT_STARTED),
-            scale=_scale(self.body, scene),
-            gate=self.gate,
-            scene=scene,
-        )
-
-
-def validated(job: Job, grasps: Sequence[Grasp], processors: int) -> Iterator[Verdict]:
-    """Yield one verdict per grasp, in order; the number of processors does not change results."""
-    count = len(grasps)
-    return each(
-        job.prepared(count, processors).attempted, grasps, jobs=processes(count, processors)
-    )
 
 
 def validate_all(
@@ -297,7 +231,7 @@ def validate_all(
     agenda: Agenda | None = None,
     setup: Setup | None = None,
     jobs: int = 1,
-    progress: Progress | None = None,
+    progress: VerdictProgress | None = None,
 ) -> tuple[Verdict, ...]:
     """Test many grasps of one object in simulation, each as `validate` does.
 
@@ -328,106 +262,68 @@ def validate_all(
     value_of(Count, jobs, "jobs")
     if progress is not None:
         function(progress, "progress")
-    job = Job(body, friction, agenda, setup)
     verdicts: list[Verdict] = []
-    for verdict in validated(job, listed, jobs) if jobs > 1 else map(job.attempted, listed):
+    if not listed:
+        return ()
+    gate = checked_for(body, friction, agenda, setup)
+    for verdict in validated(body, listed, friction, gate, agenda, setup, jobs):
         verdicts.append(verdict)
         if progress is not None:
             progress(len(verdicts), len(listed), verdict)
     return tuple(verdicts)
 
 
-STREAM = 1
-"""Number of the random stream of noise, apart from other draws with the same seed."""
+def validated(
+    body: Polyhedron, grasps: Sequence[Grasp], friction: float, gate: Gate, agenda: Agenda,
+    setup: Setup, jobs: int,
+) -> Iterator[Verdict]:  # fmt: skip
+    """Yield one verdict per grasp, in order; the number of processors does not change results."""
+    count = processes(len(grasps), jobs)
+    setup = replace(setup.for_body(body), threads=max(setup.threads, jobs // count))
+    work = partial(attempted, body, friction=friction, gate=gate, agenda=agenda, setup=setup)
+    return each(work, grasps, jobs=count)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Disturbed:
-    """A grasp after one draw of noise: `contacts` are `landed` with normals that lean."""
-
-    landed: tuple[Contact, ...]
-    """Where fingers meet the surface, with the model's normals; fewer than k contacts if some
-    miss."""
-    contacts: tuple[Contact, ...]
-    missed: tuple[int, ...]
-    friction: float
-    mass: float  # mass of the trial, relative to the planned mass
+def proved_and_tested(
+    body: Polyhedron, grasp: Grasp, *, friction: float, gate: Gate, agenda: Agenda, setup: Setup
+) -> Verdict:
+    """Test a grasp with a simulator that was checked before."""
+    proved = proved_closed(body, grasp, friction, setup)
+    return tested(body, proved, friction, gate, agenda, setup)
 
 
-def disturbed(
-    body: Polyhedron, grasp: Grasp, friction: float, noise: Noise, seed: int, number: int
-) -> Disturbed:
-    """Disturb a grasp by the noise of one repeated trial."""
-    rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(STREAM, number)))
-    shift, turn = noise.shift * body.radius * rng.normal(size=3), rng.normal(size=3)
-    slipperiness, heaviness = rng.normal(size=2)
-    leaning = math.radians(noise.normal_deg) * rng.normal(size=(len(grasp.contacts), 2))
-    # Turning the object is the same as turning the fingers' lines back.
-    back = _quaternion(-math.radians(noise.turn_deg) * turn)
-    center = body.center_of_mass
-    points = rotated(back, grasp.positions - center - shift) + center
-    ways = rotated(back, grasp.normals)
-    found = [
-        _landing(body, face, point, way)
-        for face, point, way in zip(grasp.faces, points, ways, strict=True)
-    ]
-    return Disturbed(
-        landed=tuple(contact for contact in found if contact is not None),
-        contacts=tuple(
-            Contact(contact.position, _leaning(contact.normal, lean))
-            for contact, lean in zip(found, leaning, strict=True)
-            if contact is not None
-        ),
-        missed=tuple(finger for finger, contact in enumerate(found) if contact is None),
-        friction=friction * math.exp(noise.friction * slipperiness),
-        mass=math.exp(noise.mass * heaviness),
-    )
-
-
-def _quaternion(rotation: Array) -> Array:
-    """Convert a rotation vector [rad] into a unit quaternion wxyz, (4,)."""
-    angle = float(np.linalg.norm(rotation))
-    return np.append(math.cos(0.5 * angle), 0.5 * np.sinc(0.5 * angle / math.pi) * rotation)
-
-
-def _leaning(normal: Array, lean: Array) -> Array:
-    """Turn a normal about an axis in the surface, given by its tangential coordinates [rad]."""
-    tangents = contact_frames(normal[None])[0, :, 1:]
-    return rotated(_quaternion(tangents @ lean), normal)
-
-
-def _landing(body: Polyhedron, face: int, point: Array, way: Array) -> Contact | None:
-    """Find where a line enters a face, or a curved surface near a point; None if nowhere."""
-    if body.patches is None:
-        plane = body.faces[face]
-        at = _crossing(plane.centroid[None], plane.normal[None], point, way)[0]
-        inside = np.isfinite(at).all() and any(
-            within(at, piece, plane.normal, 0.0) for piece in plane.pieces
+def attempted(
+    body: Polyhedron, grasp: Grasp, *, friction: float, gate: Gate, agenda: Agenda, setup: Setup
+) -> Verdict:
+    """Validate one of several grasps; the reason why it cannot be is a verdict, too."""
+    try:
+        return proved_and_tested(
+            body, grasp, friction=friction, gate=gate, agenda=agenda, setup=setup
         )
-        return Contact(at, plane.normal) if inside else None
-    facets = facets_of(body)
-    corners, normals = facets.corners, facets.normals
-    at = _crossing(corners[:, 0], normals, point, way)
-    edges = np.roll(corners, -1, axis=1) - corners
-    beside = np.einsum("tei,tei->te", np.cross(normals[:, None], edges), at[:, None] - corners)
-    hit = np.flatnonzero((beside >= 0.0).all(axis=1))
-    if not hit.size:
-        return None
-    first = hit[np.linalg.norm(at[hit] - point, axis=1).argmin()]
-    return Contact(at[first], normals[first])
-
-
-def _crossing(points: Array, normals: Array, point: Array, way: Array) -> Array:
-    """Find the points where a line enters each of n planes, (n, 3); NaN where it enters none."""
-    falling = normals @ way
-    entering = falling > 0.0
-    share = np.einsum("ni,ni->n", normals, points - point) / np.where(entering, falling, np.nan)
-    return point + share[:, None] * way
+    except OWN_FAULTS as error:
+        reason = str(error)
+    scene = setup.scene(body, grasp, friction)  # refuses what suits no grasp
+    nothing = np.full(len(grasp.contacts), np.nan)
+    hold = HoldVerdict(Outcome.ERROR, reason, np.nan, np.nan, np.nan, nothing, None)
+    return Verdict(
+        id=grasp.id,
+        contacts=grasp.contacts,
+        friction=friction,
+        critical_friction=CriticalFriction(grasp.critical_friction),
+        wrenches=(WrenchVerdict(WEAKEST, np.zeros(6), 0.0, np.inf, hold),),
+        controls=(),
+        robustness=None,
+        setup=setup,
+        agenda=replace(agenda, controls=False, **NOT_STARTED),
+        scale=TrialScale.of(body, scene.layout),
+        gate=gate,
+        scene=scene,
+    )
 
 
 NamedLoad: TypeAlias = tuple[str, Array]
 """A name with a wrench, (6,) [N, N m], torque about the centre of mass."""
-OPEN = "noise"
+OPENED_BY_NOISE = "noise"
 """Name of the negative control made of contacts that noise took out of force closure."""
 
 
@@ -461,7 +357,7 @@ def noisy_trial(
     except UndecidedError as error:
         return NoisyTrial(number, None, Outcome.ERROR, "", str(error), ())
     if not certificate.closed:  # a negative control, which must let go
-        control = Control(OPEN, case.friction, certificate)
+        control = Control(OPENED_BY_NOISE, case.friction, certificate)
         verdict = try_control(body, control, Agenda(), setup)
         if verdict.held:
             wrong = ("contacts that are proved not force-closed held the object",)
@@ -501,5 +397,5 @@ def noisy_case(
     )
     rig = closed_on(scene, setup, case.friction)
     heavy = [(name, case.mass * wrench) for name, wrench in loads]
-    analysis = Analysis(body, case.contacts, case.friction, setup, None)
-    return rig, analysis.as_they_are(rig.idle, heavy)
+    planner = LoadPlanner(body, case.contacts, case.friction, setup, None)
+    return rig, planner.as_they_are(rig.idle, heavy)

@@ -22,15 +22,17 @@ from grasp_core.figures import Compared, Shown, figure, less, more
 from grasp_core.files.file_kinds import VERDICTS
 from grasp_core.files.records import UNRECORDED
 from grasp_core.kinds import FLAT, Friction, Measured, OrInfinity, path_of
+from grasp_core.messages import MICRO
 from grasp_core.notebooks import InNotebooks
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact
-from scenes.mujoco.closure_scene import FingerDrive, Scene
+from scenes.mujoco.closure_scene import FingerDrive, Layout, Scene
 from sim_validate.closure.controls import ControlVerdict
-from sim_validate.engine.gate import Gate
-from sim_validate.engine.limits_and_friction import CriticalFriction, SimulatedLimit
+from sim_validate.engine.known_cases import Gate
 from sim_validate.engine.setup import WEAKEST, Agenda, Setup
-from sim_validate.engine.traces import LET_GO, MICRO, HoldVerdict, Outcome, Trace
+from sim_validate.engine.simulated_friction import CriticalFriction
+from sim_validate.engine.simulated_limits import SimulatedLimit
+from sim_validate.engine.traces import LET_GO, HoldVerdict, Outcome, Trace
 from sim_validate.files.result_files import AboutGrasps, AboutObject
 from sim_validate.settings import Noise
 
@@ -164,12 +166,12 @@ def interval(count: int, of: int) -> tuple[float, float]:
     return float(found.low), float(found.high)
 
 
-ROWS = 8
+TRIALS_SHOWN = 8
 """Largest number of trials that notebooks show."""
 
 
 @declared
-class Scale(Declared):
+class TrialScale(Declared):
     """The sizes with which the trials of a grasp were simulated."""
 
     grasp_size_m: float
@@ -181,21 +183,26 @@ class Scale(Declared):
     object_inertia_kg_m2: Annotated[Array, Shape(3, 3)]
     fingers: FingerDrive
 
+    @classmethod
+    def of(cls, body: Polyhedron, at: Layout) -> Self:
+        """Take the sizes from the layout of a scene."""
+        return cls(at.grasp_size_m, body.radius, at.object_kg, at.inertia_kg_m2, at.drive)
 
-PREDICTED = Compared(more, analysed=True, friction=True)
-PREDICTED_FRICTION = Shown("mu*", ".4f", compared=PREDICTED)
+
+FRICTION_PREDICTED = Compared(more, analysed=True, friction=True)
+PREDICTED_FRICTION = Shown("mu*", ".4f", compared=FRICTION_PREDICTED)
 SIMULATED_FRICTION = Shown("in sim", ".4f", compared=Compared(more, friction=True))
-SHARES = Shown("limits", ".3f", compared=None)
-MOVED = Compared(more, follows=True)
-MICRONS_MOVED = Shown("um moved", ".2g", MICRO, compared=MOVED)
+SHARES_SHOWN = Shown("limits", ".3f", compared=None)
+OBJECT_MOVED = Compared(more, follows=True)
+MICRONS_MOVED = Shown("um moved", ".2g", MICRO, compared=OBJECT_MOVED)
 MICRONS_LOADED = Shown("um when loaded", ".2g", MICRO, compared=None)
 ENDED = Compared(lambda _, after: after is not Outcome.HELD, follows=True)
-LOST = Compared(items=("no longer held", "held now"), follows=True)
+WRENCHES_LOST = Compared(items=("no longer held", "held now"), follows=True)
 LOST_WITH_NOISE = Compared(
     items=("repeats with noise no longer held", "repeats with noise held now"), close="noisy_close"
 )
-CONTROLS = Compared(less, "negative controls", of_part=True)
-CONTROLS_HELD = Compared(more, "negative controls that were not let go")
+CONTROL_COUNTS = Compared(less, "negative controls", of_part=True)
+CONTROLS_NOT_LET_GO = Compared(more, "negative controls that were not let go")
 CONTRADICTED = Compared(more, "contradictions of the analysis", follows=True)
 """How the figures of a verdict are shown, and compared with those of an earlier one."""
 
@@ -209,12 +216,12 @@ class Verdict(HoldsWrenches, InNotebooks):
     friction: Friction
     critical_friction: CriticalFriction
     wrenches: Annotated[tuple[WrenchVerdict, ...], Compared(less)]
-    controls: Annotated[tuple[ControlVerdict, ...], CONTROLS]
+    controls: Annotated[tuple[ControlVerdict, ...], CONTROL_COUNTS]
     robustness: Robustness | None
     """How often the grasp holds with noise, if asked for."""
     setup: Setup
     agenda: Agenda
-    scale: Scale
+    scale: TrialScale
     gate: Annotated[Gate | None, UNRECORDED] = field(default=None, compare=False)
     """How the simulator did on cases with known answers; a file has it once, for all verdicts."""
     scene: Annotated[Scene | None, UNRECORDED] = field(default=None, compare=False)
@@ -240,7 +247,7 @@ class Verdict(HoldsWrenches, InNotebooks):
 
     @computed_field
     @property
-    def shares_found(self) -> Annotated[tuple[float, float] | None, SHARES]:
+    def shares_found(self) -> Annotated[tuple[float, float] | None, SHARES_SHOWN]:
         """Least and largest share of predicted limits at which the object let go; None if none."""
         found = [each.let_go_at.share for each in self.wrenches if each.let_go_at]
         return (min(found), max(found)) if found else None
@@ -258,7 +265,7 @@ class Verdict(HoldsWrenches, InNotebooks):
         return _largest([trial.hold.start_displacement_m for trial in self.wrenches])
 
     @figure
-    def rotation_rad(self) -> Annotated[Measured, MOVED]:
+    def rotation_rad(self) -> Annotated[Measured, OBJECT_MOVED]:
         """Largest rotation of the object in the trials that hold a wrench [rad]."""
         return _largest([trial.hold.rotation_rad for trial in self.wrenches])
 
@@ -296,7 +303,7 @@ class Verdict(HoldsWrenches, InNotebooks):
         return self.outcome is Outcome.HELD
 
     @figure
-    def not_held(self) -> Annotated[tuple[str, ...], LOST]:
+    def not_held(self) -> Annotated[tuple[str, ...], WRENCHES_LOST]:
         """Names of the wrenches that were not held, in order."""
         return tuple(trial.name for trial in self.failures)
 
@@ -307,7 +314,7 @@ class Verdict(HoldsWrenches, InNotebooks):
         return not self.controls_held
 
     @figure
-    def controls_held(self) -> Annotated[tuple[str, ...], CONTROLS_HELD]:
+    def controls_held(self) -> Annotated[tuple[str, ...], CONTROLS_NOT_LET_GO]:
         """Names of the negative controls that did not let go: they held, or are undecided."""
         return tuple(each.control.name for each in self.controls if not each.let_go)
 
@@ -373,7 +380,7 @@ def _disagreement(friction: CriticalFriction) -> str:
 def _rows(verdict: Verdict) -> list[tuple[str, ...]]:
     rows: list[tuple[str, ...]] = [("trial", "outcome", "limit predicted", "simulated")]
     trials = sorted(verdict.wrenches, key=lambda trial: trial.hold.outcome is Outcome.HELD)
-    for trial in trials[:ROWS]:
+    for trial in trials[:TRIALS_SHOWN]:
         found = trial.simulated_limit
         simulated = "-" if found is None else f"{found:.4g}"
         predicted = f"{trial.predicted_limit:.4g}"

@@ -26,7 +26,7 @@ COMMANDS: Mapping[str, Command] = {
         "closure.",
     ),
     "validate": Command(
-        "commands.simulation_flags:ValidateFlags", "protocols.command:judge_file",
+        "commands.simulation_flags:ValidateFlags", "protocols.command:validate_file",
         "Simulate the grasps of a file in MuJoCo, with negative controls: contacts that must "
         "fail.",
     ),

@@ -17,7 +17,8 @@ from sim_validate.datasets.parquet import pyarrow
 from sim_validate.datasets.resuming import Staging
 from sim_validate.datasets.work_units import WorkUnit, units_of, units_sha256
 from sim_validate.datasets.writing import DATA, EXTRAS, GIVEN_CONTACTS, close, write_rows
-from sim_validate.engine.gate import require_faithful
+from sim_validate.engine.gate import ClosureCase
+from sim_validate.engine.known_cases import checked
 from sim_validate.engine.setup import Setup
 from sim_validate.files.locks import entries
 from sim_validate.files.output_folders import alone_in
@@ -95,7 +96,7 @@ def _refuse_others(folder: Path, config: DatasetConfig) -> None:
 def _check_simulator(config: DatasetConfig, units: Sequence[WorkUnit]) -> None:
     """Check the simulator on known cases; one that fails at an object's size leaves that out."""
     for friction in config.frictions if units else ():
-        require_faithful(Setup(), friction)
+        checked(ClosureCase.of(Setup(), friction))
 
 
 def _finished(folder: Path, units: Sequence[WorkUnit]) -> Manifest:

@@ -10,7 +10,6 @@ A cell is null where its figure does not exist for the contacts: fewer than four
 contacts that are not in force closure no witness forces.
 """
 
-import hashlib
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
@@ -38,12 +37,13 @@ from grasp_core.planning.given_contacts import Seated, grasp_of, seat
 from grasp_core.quality.metrics import smallest_singular_value
 from grasp_core.regions.certify_placement import usual_bound
 from grasp_core.values import FINGERS, Contact, ContactRegion, Grasp, four
-from sim_validate.closure.controls import LEAST_FRICTION, negative_controls, try_control
+from sim_validate.closure.controls import LEAST_CONTROL_FRICTION, negative_controls, try_control
 from sim_validate.closure.validate import validate
 from sim_validate.closure.verdict import Verdict
 from sim_validate.datasets.columns import ExecutionCells, ExecutionRow, GraspRow
 from sim_validate.datasets.config import DatasetConfig, Learning
 from sim_validate.datasets.parquet import RowCells
+from sim_validate.engine.misplacement import draws_by_name
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.execution.execute import execute, tip_radius
 from sim_validate.execution.verdict import ExecutedGrasp, ExecutionTrial
@@ -246,18 +246,14 @@ def variants(
     at = Seated(body, grasp.faces, grasp.contacts)
     for kind in ("friction_below", "friction_near", "friction_above"):
         for number in range(getattr(asked, kind)):
-            ratio = _ratio(kind, draws(seed, grasp.id, kind, number))
+            ratio = _ratio(kind, draws_by_name(seed, grasp.id, kind, number))
             varied = _short(ratio * grasp.critical_friction)
-            if LEAST_FRICTION <= varied <= LARGEST_FRICTION:
+            if LEAST_CONTROL_FRICTION <= varied <= LARGEST_FRICTION:
                 yield from _decided(kind, number, at, varied, UNMOVED)
     for number in range(asked.moved_out):
-        yield from _moved(body, grasp, friction, number, draws(seed, grasp.id, "moved_out", number))
-
-
-def draws(seed: int, grasp: str, kind: str, number: int) -> np.random.Generator:
-    """Return the generator of one varied grasp's draws."""
-    digest = hashlib.sha256(f"{seed} {grasp} {kind} {number}".encode()).digest()
-    return np.random.default_rng(int.from_bytes(digest[:16], "big"))
+        yield from _moved(
+            body, grasp, friction, number, draws_by_name(seed, grasp.id, "moved_out", number)
+        )
 
 
 def region_exit(region: ContactRegion, contact: Contact, way: Array) -> float:
@@ -337,7 +333,7 @@ def heavier(
     lost_kg, kind = executed.least_predicted_loss * executed.execution.mass_kg, "mass_near"
     at = Seated(body, grasp.faces, grasp.contacts)
     for number in range(asked.mass_near):
-        mass_kg = _short(_ratio(kind, draws(seed, grasp.id, kind, number)) * lost_kg)
+        mass_kg = _short(_ratio(kind, draws_by_name(seed, grasp.id, kind, number)) * lost_kg)
         if 0.0 < mass_kg < math.inf:
             cells = {"kind": kind, **UNMOVED, "mass_ratio": mass_kg / lost_kg}
             yield Variant(f"{kind}-{number}", at, friction, grasp, cells, mass_kg)
@@ -358,7 +354,7 @@ def validated_with(
     """Test a grasp in simulation, with no more than some synthetic negative controls."""
     verdict = validate(body, grasp, friction, agenda=replace(agenda, controls=False))
     found = negative_controls(body, grasp, friction, agenda.seed)
-    order = draws(agenda.seed, grasp.id, "synthetic", 0).permutation(len(found))
+    order = draws_by_name(agenda.seed, grasp.id, "synthetic", 0).permutation(len(found))
     kept = (found[int(place)] for place in np.sort(order[:most]))
     controls = tuple(try_control(body, each, agenda, Setup()) for each in kept)
     return replace(verdict, controls=controls, agenda=agenda)

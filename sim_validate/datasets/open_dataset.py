@@ -27,7 +27,7 @@ from grasp_core.mesh_files.reading import FileSurface, read_triangles
 from grasp_core.objects.build import DEFAULT_LIMITS, content_hash
 from grasp_core.objects.polyhedron import Polyhedron, polyhedron_from_mesh
 from grasp_core.objects.surface import Surface
-from sim_validate.closure.replaying import Recorded, Wanted
+from sim_validate.closure.replaying import Recorded, WantedTrial
 from sim_validate.datasets.columns import ROW_CLASSES, DatasetRows, GraspRow, ObjectRow, TrialRow
 from sim_validate.datasets.config import (
     ID_DIGITS,
@@ -195,7 +195,7 @@ def mesh_path(folder: Path, object_id: str) -> Path:
     return path_inside(folder, f"{FOLDER}/{object_id}.obj")
 
 
-def recorded_in_dataset(folder: Path, wanted: Wanted) -> Recorded:
+def recorded_in_dataset(folder: Path, wanted: WantedTrial) -> Recorded:
     """Read a grasp or a negative control from the tables of a dataset."""
     chosen = select(folder)
     if wanted.grasp is None or wanted.trial is not None or wanted.grasps is not None:

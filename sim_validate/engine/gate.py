@@ -38,90 +38,65 @@ low, and friction is lowered to it.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
-from typing import Protocol, Self
+from typing import Self
 
 import numpy as np
-from pydantic import computed_field
 
 from grasp_core.arrays import Array
 from grasp_core.closure.contacts import contact_frictions, stacked
-from grasp_core.declared import Declared, declared
-from grasp_core.errors import UnfaithfulError
-from grasp_core.kinds import Measured, OrInfinity
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.provenance import versions
 from grasp_core.quality.wrench_limits import WrenchBody, axis_wrenches, limit_of
 from grasp_core.values import Contact
-from scenes.example_objects import example_object
-from scenes.mujoco.closure_scene import Scene
-from sim_validate.engine.limits_and_friction import (
-    Rig,
-    SimulatedLimit,
-    bisected,
-    bisected_limits,
-    forces_just_above,
-    part,
-    ramped_limits,
-    released_friction,
-    squeezed,
+from sim_validate.engine.known_cases import (
+    DEPTH,
+    DEPTH_ERROR,
+    NORMAL_ERROR,
+    GateCheck,
+    angles,
+    near,
+    sized,
+    touch_checks,
+    two_digits,
 )
+from sim_validate.engine.rig import Rig, squeezed
+from sim_validate.engine.schedules import Schedule, TrialLoad, part
 from sim_validate.engine.setup import Setup
-from sim_validate.engine.simulate import CLOCK_SLACK_S, Bench, Load, Schedule
+from sim_validate.engine.simulated_friction import bisected, forces_just_above, released_friction
+from sim_validate.engine.simulated_limits import SimulatedLimit, bisected_limits, ramped_limits
+from sim_validate.engine.stepping import CLOCK_SLACK_S, Bench
 from sim_validate.engine.traces import holds
 
-LEAST_OFFSET, LARGEST_OFFSET = 0.01, 1.0
+LEAST_OFFSET, MOST_OFFSET = 0.01, 1.0
 """Least and largest critical friction that two offset fingers on the box can be made to need."""
 PUSH = 0.6
 """Normal force of the fingers on the box, relative to the largest normal force allowed."""
 
 
-@declared
-class Check(Declared):
-    """One figure measured in simulation, and the interval in which it must lie."""
-
-    name: str
-    value: Measured
-    """The measured figure, or NaN if it could not be measured."""
-    least: float
-    largest: OrInfinity
-
-    @property
-    def passed(self) -> bool:
-        """Whether the measured figure lies in its interval."""
-        return self.least <= self.value <= self.largest
-
-    def __str__(self) -> str:
-        state = "ok" if self.passed else "OUT OF TOLERANCE"
-        return (
-            f"{self.name}: {self.value:.6g} (from {self.least:.6g} to {self.largest:.6g}) {state}"
-        )
-
-
-def near(name: str, ratio: float | None, tolerance: float) -> Check:
-    """Check that a measured figure, over the known one, is one; None if it was not measured."""
-    return Check(name, math.nan if ratio is None else ratio, 1.0 - tolerance, 1.0 + tolerance)
-
-
-def sized(name: str, radius_m: float) -> Polyhedron:
-    """Scale an example object to a size, with its centre of mass at the origin."""
-    example = example_object(name)
-    vertices = (example.vertices - example.center_of_mass) * radius_m / example.radius
-    return Polyhedron.from_mesh(vertices, example.triangles, name=name)
+USUAL_FRICTION, USUAL_RADIUS_M = 0.5, 0.07
 
 
 @dataclass(frozen=True, slots=True)
-class Case:
+class ClosureCase:
     """The settings, friction and object size with which the simulator is checked on known cases."""
 
     setup: Setup
     friction: float
     radius_m: float
 
+    @classmethod
+    def of(
+        cls, setup: Setup, friction: float = USUAL_FRICTION, radius_m: float = USUAL_RADIUS_M
+    ) -> Self:
+        """Leave out of some settings what has no part in known cases."""
+        fingers = replace(setup.fingers, fingertip_radius_m=None, approach=None)
+        surface = setup.surface or "object"  # as on the known cases
+        plain = replace(setup, fingers=fingers, surface=surface, threads=1, timeout_s=math.inf)
+        return cls(plain, friction, two_digits(radius_m))
+
     @property
     def offset_friction(self) -> float:
         """The friction under test, or the nearest one that offset fingers on a box can need."""
-        return min(max(self.friction, LEAST_OFFSET), LARGEST_OFFSET)
+        return min(max(self.friction, LEAST_OFFSET), MOST_OFFSET)
 
     @property
     def push(self) -> float:
@@ -132,7 +107,7 @@ class Case:
         """Scale an example object to the size under test."""
         return sized(name, self.radius_m)
 
-    def checks(self) -> tuple[Check, ...]:
+    def checks(self) -> tuple[GateCheck, ...]:
         """Measure all figures, on what the settings have fingertips touch."""
         touches = () if self.setup.surface == "pads" else surface_touches(self)
         held = tetrahedron(self)
@@ -150,7 +125,7 @@ class Case:
         return replace(squeezed(bench, self.setup, forces, friction), whole=True)
 
 
-def tetrahedron(case: Case) -> tuple[Rig, list[Load]]:
+def tetrahedron(case: ClosureCase) -> tuple[Rig, list[TrialLoad]]:
     """Squeeze a tetrahedron at its face centres, and find its limit wrenches on twelve axes."""
     body, largest = case.body("tetrahedron"), case.setup.fingers.max_normal_force_n
     contacts = [Contact(face.centroid, face.normal) for face in body.faces]
@@ -159,12 +134,12 @@ def tetrahedron(case: Case) -> tuple[Rig, list[Load]]:
     frictions = contact_frictions(case.friction, len(contacts))
     resisted = WrenchBody(arms, body.normals, frictions, largest)
     found = [limit_of(resisted, wrench) for wrench in axis_wrenches(body.radius)]
-    return rig, [Load(limit.limit * limit.wrench, limit.forces) for limit in found]
+    return rig, [TrialLoad(limit.limit * limit.wrench, limit.forces) for limit in found]
 
 
 AZIMUTHS_DEG = (0.0, 22.5, 45.0, 67.5)
 AT_AZIMUTHS = [f", at {azimuth:g} deg" for azimuth in AZIMUTHS_DEG]
-SIDES = [(s, t) for s in (-1.0, 1.0) for t in (-1.0, 1.0)]
+PLACE_SIGNS = [(s, t) for s in (-1.0, 1.0) for t in (-1.0, 1.0)]
 """Signs of the places of four contacts, two on each of two opposite faces."""
 SLIP_TOLERANCE = 0.005
 """Largest error of the load at which a box slips, relative to the load that statics predicts."""
@@ -175,64 +150,64 @@ CREEP_LIMIT = 1e-4
 it."""
 CREEP_SHARE = 0.2
 """Largest share of a hold's displacement threshold that creep may use up."""
-SHARE = 0.8
+SHARE_HELD = 0.8
 """Load on the tetrahedron, relative to the largest load that it resists."""
 HIDDEN_LIMIT = 0.01
 """Largest force that may act without a threshold noticing it, relative to the largest normal force.
 It is ten times what the usual thresholds let pass."""
-NEAR = 0.01
+NEAR_CRITICAL = 0.01
 """Distance from the critical friction, relative to it, at which a hold must tell whether the object
 stays."""
 BLOW_UP = 1e14
 """Each part of a load that no simulation survives [N, N m]."""
 
 
-def _incline(case: Case) -> list[Check]:
+def _incline(case: ClosureCase) -> list[GateCheck]:
     """Let a box weigh on four rigid supports, pull it at their level, and check when it slides."""
     body = case.body("box")
     length, width, height = np.ptp(body.vertices, axis=0)
     contacts = [
         Contact(np.array([s * length / 4, t * width / 4, -height / 2]), np.array([0, 0, 1.0]))
-        for s, t in SIDES
+        for s, t in PLACE_SIGNS
     ]
     rigid = replace(case.setup, fingers=replace(case.setup.fingers, drive="rigid"))
     weight = case.setup.fingers.max_normal_force_n
-    resting = Load(np.array([0, 0, -weight, 0, 0, 0.0]), np.zeros((4, 3)))
+    resting = TrialLoad(np.array([0, 0, -weight, 0, 0, 0.0]), np.zeros((4, 3)))
     bench = Bench(rigid.scene(body, contacts, case.friction))
     rig = Rig(bench, case.setup, case.friction, resting, None, whole=True)
     pulls = [case.friction * weight * np.array([*way, 0.0]) for way in _ways()]
     torques = [np.cross([0.0, 0.0, -height / 2], pull) for pull in pulls]  # so that it cannot tip
     limits = [
-        Load(resting.wrench + np.concatenate([pull, torque]), resting.forces)
+        TrialLoad(resting.wrench + np.concatenate([pull, torque]), resting.forces)
         for pull, torque in zip(pulls, torques, strict=True)
     ]
     name = "slope at which a box slides, over friction"
     return _slips(name, bisected_limits(rig, limits), AT_AZIMUTHS)
 
 
-def _pulled_box(case: Case) -> list[Check]:
+def _pulled_box(case: ClosureCase) -> list[GateCheck]:
     """Pull a box that fingers hold on two opposite faces, and check when it slips."""
     body = case.body("box")
     length, width, _ = np.ptp(body.vertices, axis=0)
     rig = _held_across(case, body, length, width / 4)
     forces, largest = rig.idle.forces, 4.0 * case.friction * case.push
     limits = [
-        Load(np.array([0, *(largest * way), 0, 0, 0]), forces - np.array([0, *(largest * way / 4)]))
-        for way in _ways()
+        TrialLoad(np.array([0, *pull, 0, 0, 0]), forces - np.array([0, *(pull / 4)]))
+        for pull in [largest * way for way in _ways()]
     ]
     return _by_both("pull at which a held box slips, over 4 mu N", rig, limits, AT_AZIMUTHS)
 
 
-def _held_across(case: Case, body: Polyhedron, length: float, lever: float) -> Rig:
+def _held_across(case: ClosureCase, body: Polyhedron, length: float, lever: float) -> Rig:
     """Squeeze a box on the two faces across x, with fingers a lever from their middles."""
     contacts = [
         Contact(np.array([s * length / 2, t * lever, 0.0]), np.array([-s, 0.0, 0.0]))
-        for s, t in SIDES
+        for s, t in PLACE_SIGNS
     ]
     return case.squeezed(body, contacts, case.push * stacked(contacts)[1], case.friction)
 
 
-def _twisted_box(case: Case) -> list[Check]:
+def _twisted_box(case: ClosureCase) -> list[GateCheck]:
     """Twist a box that soft fingers hold on two opposite faces, and check when it turns."""
     friction, soft = case.friction, case.setup.physics.torsion_m
     if not soft:
@@ -245,9 +220,9 @@ def _twisted_box(case: Case) -> list[Check]:
     each = math.hypot(friction * lever, soft)
     # a point of the limit surface: sliding and turning as fast as one rigid body does
     slides = case.push * friction**2 * lever / each
-    limit = Load(
+    limit = TrialLoad(
         np.array([0, 0, 0, 4.0 * case.push * each, 0, 0]),
-        rig.idle.forces - np.array([[0.0, 0.0, t * slides] for _, t in SIDES]),
+        rig.idle.forces - np.array([[0.0, 0.0, t * slides] for _, t in PLACE_SIGNS]),
     )
     name = "twist at which a held box turns, over 4 N sqrt((mu a)^2 + mu_t^2)"
     return _by_both(name, rig, [limit], [""])
@@ -258,13 +233,17 @@ def _ways() -> list[Array]:
     return list(np.column_stack([np.cos(turns), np.sin(turns)]))
 
 
-def _by_both(name: str, rig: Rig, limits: Sequence[Load], ways: Sequence[str]) -> list[Check]:
+def _by_both(
+    name: str, rig: Rig, limits: Sequence[TrialLoad], ways: Sequence[str]
+) -> list[GateCheck]:
     """Find the loads at which a box slips by holds and by ramps."""
     held, ramped = bisected_limits(rig, limits), ramped_limits(rig, limits)
     return [*_slips(f"{name}, by holds", held, ways), *_slips(f"{name}, by ramps", ramped, ways)]
 
 
-def _slips(name: str, found: Sequence[SimulatedLimit | None], ways: Sequence[str]) -> list[Check]:
+def _slips(
+    name: str, found: Sequence[SimulatedLimit | None], ways: Sequence[str]
+) -> list[GateCheck]:
     """Compare the loads at which a box slips with those of statics, one check per direction."""
     return [
         near(f"{name}{way}", at and at.share, SLIP_TOLERANCE)
@@ -272,7 +251,7 @@ def _slips(name: str, found: Sequence[SimulatedLimit | None], ways: Sequence[str
     ]
 
 
-def _offset_fingers(case: Case) -> list[Check]:
+def _offset_fingers(case: ClosureCase) -> list[GateCheck]:
     """Offset two fingers on each of two opposite faces, and check at which friction they let go."""
     body = case.body("box")
     length, _, distance = np.ptp(body.vertices, axis=0)
@@ -281,7 +260,7 @@ def _offset_fingers(case: Case) -> list[Check]:
     shift = 0.5 * critical * distance + gap
     contacts = [
         Contact(np.array([s * shift + t * gap, 0.0, s * distance / 2]), np.array([0.0, 0.0, -s]))
-        for s, t in SIDES
+        for s, t in PLACE_SIGNS
     ]
     places = stacked(contacts)
     bench = Bench(case.setup.scene(body, contacts, critical))
@@ -289,22 +268,24 @@ def _offset_fingers(case: Case) -> list[Check]:
     rig = case.squeezed(body, contacts, case.push * forces_just_above(*places, critical), critical)
 
     def stays(frictions: list[float]) -> list[bool | None]:
-        traces = [replace(rig, friction=each).hold([rig.idle])[0] for each in frictions]
+        traces = [
+            rig.traced(replace(rig, friction=each).holds([rig.idle]))[0] for each in frictions
+        ]
         return [holds(trace, rig.bench.scene.layout, case.setup.hold) for trace in traces]
 
     held = bisected(stays, critical, case.setup.friction)
     name = "friction at which offset fingers let go, over h / w"
     return [
         near(f"{name}, by releases", released and released / critical, SLIP_TOLERANCE),
-        near(f"{name}, by holds", held and sum(held) / (2.0 * critical), NEAR),
+        near(f"{name}, by holds", held and sum(held) / (2.0 * critical), NEAR_CRITICAL),
     ]
 
 
-def _creep(rig: Rig, limits: Sequence[Load]) -> Check:
+def _creep(rig: Rig, limits: Sequence[TrialLoad]) -> GateCheck:
     """Check how fast a held object creeps under a part of the loads that it resists."""
     speeds, protocol = list[float](), rig.setup.hold
     # the mean speed in the second half; NaN if the trial is not valid
-    for trace in rig.hold([part(rig.idle, limit, SHARE) for limit in limits]):
+    for trace in rig.traced(rig.holds([part(rig.idle, limit, SHARE_HELD) for limit in limits])):
         half = len(trace.times_s) // 2
         if trace.health.fault or not half:
             speeds.append(math.nan)
@@ -314,10 +295,10 @@ def _creep(rig: Rig, limits: Sequence[Load]) -> Check:
     # the maximum is NaN if one speed is
     speed = float(np.abs(speeds).max()) / rig.bench.scene.layout.grasp_size_m
     most = min(CREEP_LIMIT, CREEP_SHARE * protocol.hold_threshold / protocol.hold_s)
-    return Check("creep under load, in grasp sizes per second", speed, 0.0, most)
+    return GateCheck("creep under load, in grasp sizes per second", speed, 0.0, most)
 
 
-def _hidden(rig: Rig) -> Check:
+def _hidden(rig: Rig) -> GateCheck:
     """Check how large a force may be before the displacement thresholds notice it."""
     layout, setup = rig.bench.scene.layout, rig.setup
     threshold = max(
@@ -327,16 +308,16 @@ def _hidden(rig: Rig) -> Check:
     hidden = layout.drive.stiffness_n_per_m * threshold * layout.grasp_size_m
     share = hidden / setup.fingers.max_normal_force_n
     name = "force hidden below the thresholds, over the largest normal force"
-    return Check(name, share, 0.0, HIDDEN_LIMIT)
+    return GateCheck(name, share, 0.0, HIDDEN_LIMIT)
 
 
-def _blow_up(rig: Rig) -> Check:
+def _blow_up(rig: Rig) -> GateCheck:
     """Check the simulator's clock after a load so large that numbers overflow."""
-    (trace,) = rig.hold([Load(np.full(6, BLOW_UP), rig.idle.forces)])
+    (trace,) = rig.traced(rig.holds([TrialLoad(np.full(6, BLOW_UP), rig.idle.forces)]))
     seen = not trace.health.finite or trace.health.warnings > 0
     error = trace.health.clock_error_s if seen else math.nan
     name = "simulated less stepped time after a blow-up, in seconds"
-    return Check(name, error, -CLOCK_SLACK_S, CLOCK_SLACK_S)
+    return GateCheck(name, error, -CLOCK_SLACK_S, CLOCK_SLACK_S)
 
 
 GAP_LIMIT = 1e-9
@@ -349,14 +330,14 @@ LOW, LOW_GAP_LIMIT = 0.05, 1e-7
 difference between the two solvers there, in grasp sizes: a hundredth of the finest threshold. Usual
 solvers differ by 2e-8 at most, on a millimetre. Solvers under which boxes of that size were seen to
 let go far above their critical friction, implicit integrators among them, differ by 4e-5."""
-LIGHT = 1e-3
+LIGHT_PUSH = 1e-3
 """Normal force of the two fingers that hardly push, relative to that of the others."""
-ABOVE = (1.01, 1.05, 2.0)
+RELEASED_ABOVE = (1.01, 1.05, 2.0)
 """Frictions at which the box is released, relative to the friction that it needs; it stays at
 each."""
 
 
-def solver_gaps(case: Case) -> tuple[Check, Check]:
+def solver_gaps(case: ClosureCase) -> tuple[GateCheck, GateCheck]:
     """Compare motions under the chosen solver with motions under one that iterates to the end."""
     physics = replace(
         case.setup.physics, solver="Newton", jacobian="dense", tolerance=1e-18, iterations=300,
@@ -370,8 +351,8 @@ def solver_gaps(case: Case) -> tuple[Check, Check]:
     here, there = ([held, released], [low]) if case.friction >= LOW else ([held], [released, low])
     name = "motion that a solver to the last digit changes"
     return (
-        Check(name, _gap(here), 0.0, GAP_LIMIT),
-        Check(f"{name}, at friction {LEAST_OFFSET:g}", _gap(there), 0.0, LOW_GAP_LIMIT),
+        GateCheck(name, _gap(here), 0.0, GAP_LIMIT),
+        GateCheck(f"{name}, at friction {LEAST_OFFSET:g}", _gap(there), 0.0, LOW_GAP_LIMIT),
     )
 
 
@@ -380,10 +361,10 @@ def _gap(pairs: Sequence[Sequence[Array]]) -> float:
     return float(np.max(gaps))  # the maximum is NaN if one difference is
 
 
-def _held(case: Case) -> Array:
+def _held(case: ClosureCase) -> Array:
     """Simulate the held tetrahedron; return joint positions (trials, n, q) in grasp sizes."""
     rig, limits = tetrahedron(case)
-    return _in_sizes(rig, rig.holds([part(rig.idle, limit, SHARE) for limit in limits]))
+    return _in_sizes(rig, rig.holds([part(rig.idle, limit, SHARE_HELD) for limit in limits]))
 
 
 def _in_sizes(rig: Rig, trials: Sequence[Schedule]) -> Array:
@@ -393,7 +374,7 @@ def _in_sizes(rig: Rig, trials: Sequence[Schedule]) -> Array:
     return joints / scale
 
 
-def _released(case: Case, needed: float) -> Array:
+def _released(case: ClosureCase, needed: float) -> Array:
     """Release a box at frictions above the one it needs; return joint positions as `_held` does.
 
     Fingers squeeze it along an oblique line from above and below; two side fingers hardly push.
@@ -408,70 +389,25 @@ def _released(case: Case, needed: float) -> Array:
         *(Contact(np.array([0.13 * height, s * width / 2, 0.07 * height]), np.array([0.0, -s, 0.0]))
           for s in (-1.0, 1.0)),
     ]  # fmt: skip
-    pushes = np.array([1.0, 1.0, LIGHT, LIGHT])[:, None] * stacked(contacts)[1]
+    pushes = np.array([1.0, 1.0, LIGHT_PUSH, LIGHT_PUSH])[:, None] * stacked(contacts)[1]
     pushes[:2, 0] = needed * np.array([1.0, -1.0])
     box = case.squeezed(body, contacts, case.push * pushes, needed)
     settling = case.setup.friction.settling_friction * needed
-    return _in_sizes(box, box.releases(settling, [above * needed for above in ABOVE]))
+    return _in_sizes(box, box.releases(settling, [above * needed for above in RELEASED_ABOVE]))
 
 
-DEPTH = 1e-4
-"""Depth to which rigid fingertips are put into the faces, in object radii. It is a thousand times
-the rounding of a vertex coordinate, which meshes hold in single precision."""
-NORMAL_ERROR = 1e-4
-"""Largest angle between the normal of a contact and the normal of its face [rad]; the angle acts
-like that much additional friction."""
-DEPTH_ERROR = 0.1
-"""Largest relative error of a contact's depth: vertices may be three hundredths of it off their
-faces."""
-MANY_FACED, FINGERS = "random-100-1", 20
+MANY_FACED, FINGERS_AT_ONCE = "random-100-1", 20
 """An example mesh with many faces, and how many fingertips touch it at a time."""
 
 
-def angles(normals: Array, faces: Array) -> Array:
-    """Return the angles between normals and those of their faces, (k,) [rad]."""
-    across = np.linalg.norm(np.cross(normals, faces), axis=1)
-    return np.arctan2(across, np.einsum("ki,ki->k", normals, faces))
-
-
-def misplaced(bench: Bench[Scene], edges_m: Sequence[float] = ()) -> tuple[str, ...]:
-    """List fingertips that do not touch the object at their start as their faces lie.
-
-    `edges_m` are the distances of contacts from the edges of their faces [m], where known: there
-    the surface, flat only to a mesh's digits, is farthest from the plane of its face.
-    """
-    normals, _ = bench.touched(bench.scene.layout.holder.tip_names, one=False)
-    turned, found = angles(normals, bench.scene.layout.frames[:, :, 0]), list[str]()
-    for finger in np.flatnonzero(~(turned <= NORMAL_ERROR)).tolist():
-        edge = f", {1e3 * edges_m[finger]:.3g} mm from an edge of its face," if edges_m else ""
-        fault = (
-            "no contact is found; the mesh, flat only to its digits, may lie deeper there"
-            if math.isnan(turned[finger])
-            else f"the normal of its deepest contact is off by {turned[finger]:.3g} rad (at most "
-            f"{NORMAL_ERROR:g} is allowed)"
-        )
-        found.append(
-            f"in simulation, fingertip {finger}{edge} does not touch the object as planned: {fault}"
-            "; plan with a larger --edge-clearance-m, use --surface pads, or raise ccd_iterations "
-            "in the settings of the physics"
-        )
-    return tuple(found)
-
-
-def require_touch(bench: Bench[Scene]) -> None:
-    """Check that each fingertip touches the object at its start as the face lies."""
-    if found := misplaced(bench):
-        raise UnfaithfulError(found[0])
-
-
-def surface_touches(case: Case) -> tuple[Check, Check]:
+def surface_touches(case: ClosureCase) -> tuple[GateCheck, GateCheck]:
     """Check how fingertips that are put a little into a mesh with many faces touch them."""
     body, found = case.body(MANY_FACED), list[tuple[Array, Array, float]]()
     contacts = [Contact(face.centroid, face.normal) for face in body.faces]
     rigid = replace(case.setup.fingers, drive="rigid", indentation=0.0)
     depth = DEPTH * body.radius
-    for start in range(0, len(contacts), FINGERS):
-        group, setup = contacts[start : start + FINGERS], replace(case.setup, fingers=rigid)
+    for start in range(0, len(contacts), FINGERS_AT_ONCE):
+        group, setup = contacts[start : start + FINGERS_AT_ONCE], replace(case.setup, fingers=rigid)
         size = setup.scene(body, group, 1.0).layout.grasp_size_m
         setup = replace(setup, fingers=replace(rigid, indentation=depth / size))
         scene, faces = setup.scene(body, group, 1.0), stacked(group)[1]
@@ -482,82 +418,3 @@ def surface_touches(case: Case) -> tuple[Check, Check]:
         found.append((normals[worst], faces[worst], float(depths[worst])))
     normals, faces, depths = map(np.array, zip(*found, strict=True))
     return touch_checks(normals, faces, depths)
-
-
-def touch_checks(
-    normals: Array, faces: Array, depths: Array, where: str = ""
-) -> tuple[Check, Check]:
-    """Check contacts' normals beside those of their faces, and depths over the right ones.
-
-    Figures are the largest errors; NaN where a fingertip has no contact, or several.
-    """
-    turned, off = angles(normals, faces), np.abs(depths - 1.0)
-    normal = f"angle between a contact's normal and its face's{where}"
-    depth = f"error of a contact's depth, relative to it{where}"
-    return (
-        Check(normal, float(np.max(turned)), 0.0, NORMAL_ERROR),
-        Check(depth, float(np.max(off)), 0.0, DEPTH_ERROR),
-    )
-
-
-USUAL_FRICTION, USUAL_RADIUS_M = 0.5, 0.07
-
-
-@declared
-class Gate(Declared):
-    """The results of checking a version of MuJoCo on cases with known answers."""
-
-    checks: tuple[Check, ...]
-    mujoco: str
-
-    @computed_field
-    @property
-    def passed(self) -> bool:
-        """Whether all checks passed."""
-        return all(check.passed for check in self.checks)
-
-    def require(self, so: str) -> Self:
-        """Refuse settings under which a check failed, and say what is `so` not done with them."""
-        if not self.passed:
-            failed = "; ".join(str(check) for check in self.checks if not check.passed)
-            raise UnfaithfulError(
-                f"the simulator is not faithful with these settings, so {so}; these checks failed: "
-                f"{failed}"
-            )
-        return self
-
-
-class Cases(Protocol):
-    """Settings with which a simulator is checked on cases with known answers."""
-
-    def checks(self) -> tuple[Check, ...]:
-        """Measure all figures."""
-        ...
-
-
-@lru_cache(maxsize=256)
-def measured(cases: Cases) -> Gate:
-    """Check the simulator on known cases, once per process for the same settings."""
-    return Gate(cases.checks(), versions()["mujoco"])
-
-
-def two_digits(value: float) -> float:
-    """Round to two digits, so that what is nearly alike shares one measurement."""
-    return float(f"{value:.1e}")
-
-
-def require_faithful(
-    setup: Setup, friction: float = USUAL_FRICTION, radius_m: float = USUAL_RADIUS_M
-) -> Gate:
-    """Check the simulator on known cases, and refuse settings under which a check fails."""
-    return measured_gate(setup, friction, radius_m).require("no grasp is certified")
-
-
-def measured_gate(
-    setup: Setup, friction: float = USUAL_FRICTION, radius_m: float = USUAL_RADIUS_M
-) -> Gate:
-    """Check the simulator on the known cases of closure trials."""
-    fingers = replace(setup.fingers, fingertip_radius_m=None, approach=None)
-    surface = setup.surface or "object"  # as on the known cases
-    setup = replace(setup, fingers=fingers, surface=surface, threads=1, timeout_s=math.inf)
-    return measured(Case(setup, friction, two_digits(radius_m)))

@@ -67,15 +67,15 @@ from grasp_core.closure.contacts import cross_matrix, normal_and_tangential
 from grasp_core.declared import Declared, declared
 from grasp_core.figures import Shown
 from grasp_core.kinds import Measured
+from grasp_core.messages import MICRO, MILLI
 from grasp_core.objects.on_faces import within
 from scenes.mujoco.closure_scene import Layout, grasp_size
-from sim_validate.engine.simulate import Health, Motion, Schedule
+from scenes.mujoco.mjcf_text import IDENTITY_POSE
+from sim_validate.engine.schedules import Schedule, Thresholds
+from sim_validate.engine.stepping import Health, Motion
 from sim_validate.settings import HoldProtocol
 
 Mask: TypeAlias = NDArray[np.bool_]
-MICRO = 1e6
-PLANNED = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
-"""Planned pose of the object's frame: its position and its quaternion."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -144,7 +144,7 @@ def _start(motion: Motion, first: int, earlier: Motion | None) -> Array:
         return motion.joints[first - 1]
     if earlier is not None and len(earlier.joints):
         return earlier.joints[-1]
-    return np.append(PLANNED, np.zeros(motion.joints.shape[1] - len(PLANNED)))
+    return np.append(IDENTITY_POSE, np.zeros(motion.joints.shape[1] - len(IDENTITY_POSE)))
 
 
 def displaced(poses: Array, starts: Array, layout: Layout) -> Array:
@@ -155,7 +155,7 @@ def displaced(poses: Array, starts: Array, layout: Layout) -> Array:
 
 def strayed(poses: Array, layout: Layout) -> Array:
     """Measure displacements from the planned pose, (n,) [m]."""
-    return displaced(poses, np.broadcast_to(PLANNED, poses.shape), layout)
+    return displaced(poses, np.broadcast_to(IDENTITY_POSE, poses.shape), layout)
 
 
 def moved(poses: Array, starts: Array, layout: Layout) -> tuple[Array, Array]:
@@ -292,39 +292,29 @@ def _outcome(
     if gaps[finger] > protocol.gap_threshold * layout.grasp_size_m:
         return Outcome.LOST_CONTACT, f"finger {finger} is {_um(gaps[finger])} off its face"
     finger = int(np.argmax(slips))
-    turned = f"the object turned by {1e3 * trace.rotations_rad[first]:.3g} mrad"
+    turned = f"the object turned by {MILLI * trace.rotations_rad[first]:.3g} mrad"
     if trace.displacements_m[first] < protocol.hold_threshold * layout.grasp_size_m:
         turned += f" after {_um(trace.start_m)} of motion while it was loaded"
     return Outcome.SLIPPED, f"finger {finger} slid {_um(slips[finger])} over its face, {turned}"
 
 
 def _um(length_m: float) -> str:
-    return f"{1e6 * length_m:.3g} um"
+    return f"{MICRO * length_m:.3g} um"
 
 
 SAFETY = 2.0
 """Factor on bounds of motions and forces, for what the linear model leaves out."""
 USABLE = 0.5
 """Largest share of a threshold that an object may use up, bounds included, to count as held."""
-SETTLED = 0.01
+SETTLED_MOTION = 0.01
 """Bound of the motion to come, relative to the threshold, at which an object has settled before
 friction is lowered. The servos' forces are then within some 1e-4 of those at rest, in largest
 normal forces, which is less than thresholds let pass."""
-WATCHED = 3
+LEAST_WATCHED_SAMPLES = 3
 """Least number of samples for which an object is watched after friction was lowered. A contact that
 must slip begins to in the first step."""
-SAME = 1e-6
+SIZE_SLACK = 1e-6
 """Difference of two sizes that is rounding, relative to them."""
-
-
-@dataclass(frozen=True, slots=True)
-class Thresholds:
-    """Displacements that answer a trial [m]."""
-
-    watched_m: float
-    """Displacement since friction was lowered."""
-    total_m: float = math.inf
-    """Displacement from the planned pose to the start, and that since then."""
 
 
 class EarlyEnds:
@@ -342,7 +332,7 @@ class EarlyEnds:
         self.frictions = np.array([trial.friction for trial in trials])
         pushes = np.array([trial.forces[-1] for trial in trials])
         self.commands = np.einsum("kij,nki->nkj", layout.frames, pushes).reshape(len(trials), -1)
-        at = PLANNED if start is None else start[:7]
+        at = IDENTITY_POSE if start is None else start[:7]
         self.starts = np.tile(at, (len(trials), 1))
         self.began_m = np.full(len(trials), strayed(at[None], layout)[0])
         self.springs = _springs(layout)
@@ -401,7 +391,7 @@ class EarlyEnds:
         """Tell whether nothing that counts can come while friction is high, (n,)."""
         if self.springs is None or reach is None:
             return np.zeros(len(places), dtype=np.bool_)
-        calm = self.springs.further(reach) <= SETTLED * self.thresholds.watched_m
+        calm = self.springs.further(reach) <= SETTLED_MOTION * self.thresholds.watched_m
         calm &= samples >= self.resting[places]
         if calm.any():
             friction = self.frictions[places, samples]
@@ -424,7 +414,7 @@ class EarlyEnds:
         if near.any():
             moved = displaced(joints[near, :7], starts[near], self.layout)
             lost[near] = (moved >= limits.watched_m) | (began[near] + moved >= limits.total_m)
-        seen = samples - self.watched[places] + 1 >= WATCHED
+        seen = samples - self.watched[places] + 1 >= LEAST_WATCHED_SAMPLES
         if springs is None or reach is None or not seen.any():
             return lost
         left_s = self.sample_s * (self.frictions.shape[1] - 1 - samples)
@@ -497,6 +487,6 @@ def _springs(layout: Layout) -> _Springs | None:
     # contacts must be hard, and as far from their closest axis as the layout's grasp size
     if not layout.has_springs or layout.softness.is_soft:
         return None
-    if grasp_size(layout.contacts) < layout.grasp_size_m * (1.0 - SAME):
+    if grasp_size(layout.contacts) < layout.grasp_size_m * (1.0 - SIZE_SLACK):
         return None
     return _Springs(layout)

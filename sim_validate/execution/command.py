@@ -27,7 +27,6 @@ from scenes.settings import ScaledScene
 from sim_validate.commands import simulation_flags
 from sim_validate.commands.console import TABLE_ROWS, Reporter, warn_of
 from sim_validate.commands.exit_codes import Exit, FlagsError
-from sim_validate.commands.simulation_flags import RunFlags
 from sim_validate.engine.setup import Setup, physics_from_file, with_planned_radius
 from sim_validate.execution.execute import ExecutionJob, Fingertips, executed
 from sim_validate.execution.verdict import (
@@ -43,7 +42,7 @@ from sim_validate.execution.verdict import (
 from sim_validate.files.output_folders import alone_in
 from sim_validate.files.result_files import AboutObject
 from sim_validate.files.results_folder import remove_results
-from sim_validate.planning.asked_objects import asked_finger, asked_grasps, grasp_with_id
+from sim_validate.planning.asked_objects import asked_grasps, grasp_with_id
 from sim_validate.settings import ChosenExecution, ExecutionSettings, Holding
 
 EXPLAINED = ("load_multiple", "payload_kg", "least_predicted_loss")
@@ -178,20 +177,12 @@ def execution_settings(
     return extended(ExecutionSettings, holding(given, body, finger), seed=seed)
 
 
-def check_executing(command: RunFlags) -> None:
+def refuse_executing(executing: ChosenExecution) -> None:
     """Refuse flags about executions where none are asked for, before any file is read."""
-    if not command.execute and command.executing != ChosenExecution():
+    if executing != ChosenExecution():
         raise FlagsError(
             "the flags from --mass-kg to --max-deg say how grasps are executed: add --execute too"
         )
-
-
-def execution_of_run(command: RunFlags, body: Polyhedron) -> ExecutionSettings | None:
-    """Build the settings of the executions that `run` is asked for; None if it is not."""
-    if not command.execute:
-        return None
-    planning = command.planning
-    return execution_settings(command.executing, body, planning.seed, asked_finger(planning))
 
 
 TextOf = Callable[[Grasp], str]

@@ -36,11 +36,12 @@ from grasp_core.objects.on_faces import check_body, check_on_faces, edge_distanc
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
 from scenes.drawing.clips import RATE, write_held_clip
-from scenes.mujoco.fingertips import fitting_radius
+from scenes.mujoco.fingertip_room import fitting_radius
 from scenes.mujoco.held_scene import SAMPLE_S, HeldScene, build_held_scene, held_physics
-from scenes.settings import PhysicsSettings
+from scenes.mujoco_options import PhysicsSettings
+from sim_validate.engine.known_cases import checked
 from sim_validate.engine.setup import MOST_THREADS
-from sim_validate.execution.gate import require_faithful_execution
+from sim_validate.execution.gate import cases_of
 from sim_validate.execution.paths import Drive
 from sim_validate.execution.predictions import Holder, NoSqueezeError, found_enough, planned
 from sim_validate.execution.simulate import (
@@ -238,7 +239,8 @@ def simulated(
 ) -> Execution:
     """Simulate the trials of an execution with the squeeze that was chosen, and judge each."""
     scene, dynamics, trials, skipped = planned(holder, settings, best)
-    require_faithful_execution(scene.layout, scene.physics, settings, settings.push_n)
+    for case in cases_of(scene.layout, scene.physics, settings, settings.push_n):
+        checked(case)
     lost_m = max(LOST * holder.body.radius, 2.0 * settings.most_m)
     bench = HeldBench(scene, threads=threads, lost_m=lost_m)
     predicted = dict(zip(trials, dynamics.losses(trials, settings), strict=True))

@@ -25,7 +25,7 @@ until the fingers lift the box, and nothing afterwards.
 Steps must be short enough where contacts open and close. A blow along x with a little more force
 than that of all four pushes takes the box off the fingers behind it and lets it slide along the
 others; springs and contacts bring it back. There is no closed form, so the motion is compared with
-that in steps that are `SHORTER` times as short as usual.
+that in steps that are `STEPS_SHORTER` times as short as usual.
 
 Fingertips must meet the faces of objects as they are, on their convex solids. A fingertip is put on
 the middle of each flat piece of the surface, of a box (one solid) and of an object that is not
@@ -50,31 +50,39 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.surface import areas_and_normals
 from grasp_core.values import Contact
 from scenes.example_objects import example_object
-from scenes.mujoco.fingertips import fitting_radius
+from scenes.mujoco.fingertip_room import fitting_radius
 from scenes.mujoco.held_scene import SAMPLE_S, HeldLayout, HeldScene, build_held_scene, held_physics
-from scenes.mujoco.scene_text import AWAY, TOUCH
-from scenes.settings import UPRIGHT, HeldSettings, PhysicsSettings
-from sim_validate.engine.gate import DEPTH, Check, measured, near, sized, touch_checks, two_digits
+from scenes.mujoco.scene_text import AWAY, TOUCH_DEPTH
+from scenes.mujoco_options import PhysicsSettings
+from scenes.settings import UPRIGHT, HeldSettings
+from sim_validate.engine.known_cases import (
+    DEPTH,
+    GateCheck,
+    near,
+    sized,
+    touch_checks,
+    two_digits,
+)
 from sim_validate.execution import paths
 from sim_validate.execution.paths import Drive, Table, idle, samples, smoother
 from sim_validate.execution.simulate import SLID, HeldBench, HeldMotion, outcome
 
 DOWN = np.array(UPRIGHT)
-WEIGHT = GRAVITY_M_PER_S2 * DOWN
-FINGERS = 4
+WEIGHT_M_PER_S2 = GRAVITY_M_PER_S2 * DOWN
+BOX_FINGERS = 4
 TOLERANCE = 0.01
 """Largest relative error of what is known in closed form: as much as predictions are trusted to."""
-SOFT = 0.1
+SOFT_PUSH = 0.1
 """Largest push in the cases, relative to stiffness times b: the geometric stiffness of the squeeze
 then takes a tenth of the springs' stiffness against turning at most."""
-LIGHT = 0.6
+LIGHT_LOAD = 0.6
 """Part of the load of slip that is put on the box where it must not slip."""
-SLOW = 30.0
+SLOW_RISE = 30.0
 """Duration T of a slow rise, in reciprocal natural frequencies. Its third derivative is at most
 60 / T^3, so the box rings by at most 60 / SLOW^3 of its deflection afterwards, 0.2 %."""
-SETTLE_S = 0.02
+SQUEEZE_SETTLE_S = 0.02
 """Time after the squeeze in which it settles; it grows so slowly that little is left to settle."""
-SHORTEST_S = 0.15
+SHORTEST_RISE_S = 0.15
 """Least duration of a slow rise, so that samples are close enough to see when a contact slips."""
 
 
@@ -103,32 +111,32 @@ class HeldCase:
     @property
     def push(self) -> float:
         """The push N of each finger [N]."""
-        return min(self.push_n, SOFT * self.stiffness_n_per_m * self.halves[1])
+        return min(self.push_n, SOFT_PUSH * self.stiffness_n_per_m * self.halves[1])
 
     @property
     def slip_n(self) -> float:
         """The load along z at which the four fingers slip by statics, 4 mu N [N]."""
-        return FINGERS * self.friction * self.push
+        return BOX_FINGERS * self.friction * self.push
 
     @property
     def light_n(self) -> float:
         """A load along each axis at once under which no fingertip slips or lifts off [N]."""
         mu = self.friction  # a contact takes q, a quarter, and slips if 2^.5 q >= mu (N - q)
-        return LIGHT * FINGERS * self.push * mu / (math.sqrt(2.0) + mu)
+        return LIGHT_LOAD * BOX_FINGERS * self.push * mu / (math.sqrt(2.0) + mu)
 
     @property
     def moving_kg(self) -> float:
         """What moves with the box: its own mass and that of the fingertips [kg]."""
-        return self.object_kg + FINGERS * self.tip_mass_kg
+        return self.object_kg + BOX_FINGERS * self.tip_mass_kg
 
     @property
     def frequency(self) -> float:
         """The natural frequency of the box along any axis, sqrt(4 k / (m + 4 m_t)) [rad/s]."""
-        return math.sqrt(FINGERS * self.stiffness_n_per_m / self.moving_kg)
+        return math.sqrt(BOX_FINGERS * self.stiffness_n_per_m / self.moving_kg)
 
-    def rise(self, slow: float = SLOW) -> Array:
+    def rise(self, slow: float = SLOW_RISE) -> Array:
         """Return shares of a load that grows in a time given in reciprocal frequencies, (n,)."""
-        return smoother(samples(max(SHORTEST_S, slow / self.frequency)))
+        return smoother(samples(max(SHORTEST_RISE_S, slow / self.frequency)))
 
     def held_box(self) -> HeldScene:
         """Build the scene of the box between its fingers."""
@@ -148,8 +156,8 @@ class HeldCase:
         squeeze = self.push * np.array([contact.normal for contact in contacts])
         return self.scene(sized("box", self.radius_m), contacts, squeeze, self.tip_radius_m)
 
-    def checks(self) -> tuple[Check, ...]:
-        """Measure all figures (see `Cases`)."""
+    def checks(self) -> tuple[GateCheck, ...]:
+        """Measure all figures."""
         faces = (*on_faces(self, "box"), *on_faces(self, "l-bracket"))
         return (*held_box(self), *free_box(self), struck_box(self), *faces)
 
@@ -167,22 +175,14 @@ class HeldCase:
         return build_held_scene(body, held, settings, physics=self.physics)
 
 
-def met(name: str, motion: HeldMotion, ratio: float) -> Check:
+def met(name: str, motion: HeldMotion, ratio: float) -> GateCheck:
     """Check that a figure of a motion, over what is known in closed form, is one."""
     return near(name, None if motion.health.fault else ratio, TOLERANCE)
 
 
-def little(name: str, motion: HeldMotion, value: float, most: float = TOLERANCE) -> Check:
+def little(name: str, motion: HeldMotion, value: float, most: float = TOLERANCE) -> GateCheck:
     """Check that a figure of a motion is at most as large as it may be."""
-    return Check(name, math.nan if motion.health.fault else value, 0.0, most)
-
-
-def require_faithful_execution(
-    layout: HeldLayout, physics: PhysicsSettings, hand: HeldSettings, push_n: float
-) -> None:
-    """Check the simulator on known cases, and refuse settings under which a check fails."""
-    for case in cases_of(layout, physics, hand, push_n):
-        measured(case).require("no grasp is executed")
+    return GateCheck(name, math.nan if motion.health.fault else value, 0.0, most)
 
 
 def cases_of(
@@ -190,7 +190,7 @@ def cases_of(
 ) -> tuple[HeldCase, ...]:
     """Return the case to check for each friction of a scene, with numbers of two digits."""
     # gravity points down the box's free axis, whatever its direction in the scene
-    upright = replace(physics, gravity=tuple(WEIGHT.tolist()))
+    upright = replace(physics, gravity=tuple(WEIGHT_M_PER_S2.tolist()))
     numbers = {
         "object_kg": layout.object_kg, "stiffness_n_per_m": layout.stiffest, "push_n": push_n,
         "radius_m": layout.radius_m, "tip_radius_m": float(layout.tip_radius_m.max()),
@@ -225,18 +225,18 @@ CREEP = 0.2
 JUMP, JUMP_SHARE = 6, 0.4
 """Samples for which a sudden load stays, and its size relative to a light one: forces overshoot to
 twice a jump at most."""
-SPARE = 8
+SPARE_SAMPLES = 8
 """Samples of a ring beyond its periods."""
-SETTLED = 8.0
-"""Time that a held load stays before it is measured, in the damper's own times c / k."""
+SETTLING_TIMES = 8.0
+"""Time that a held load stays before it is in the damper's own times c / k."""
 
 
-def held_box(case: HeldCase) -> tuple[Check, ...]:
+def held_box(case: HeldCase) -> tuple[GateCheck, ...]:
     """Check the load of slip, the deflection, the frequencies, and a palm in uniform motion."""
     bench = HeldBench(case.held_box())
-    _, start = bench.settled(paths.closing(SETTLE_S))
+    _, start = bench.settled(paths.closing(SQUEEZE_SETTLE_S))
     ramps = [_ramp(case, 0.0), _ramp(case, RISING)]
-    lag = SETTLED * 2.0 * case.damping_ratio / case.frequency
+    lag = SETTLING_TIMES * 2.0 * case.damping_ratio / case.frequency
     share = np.concatenate([case.rise(), np.ones(paths.samples(lag) + _period(case))])
     wrenches = case.light_n * share[:, None] * np.repeat([1.0, 0.0], 3)
     still = replace(idle(len(share)), wrenches=wrenches, shares=share)
@@ -251,7 +251,7 @@ def held_box(case: HeldCase) -> tuple[Check, ...]:
         for motion, drive in zip(motions[:2], ramps, strict=True)
     ]
     rest, uniform = motions[2:4]
-    spring = case.light_n / (FINGERS * case.stiffness_n_per_m)
+    spring = case.light_n / (BOX_FINGERS * case.stiffness_n_per_m)
     gone = rest.shifts[-_period(case) :].mean(axis=0) / spring
     apart = float(np.abs(uniform.shifts - rest.shifts).max()) / spring
     pulled = float(np.abs(uniform.pushes - rest.pushes).max()) / case.light_n
@@ -272,10 +272,10 @@ def held_box(case: HeldCase) -> tuple[Check, ...]:
     )  # fmt: skip
 
 
-def _oblique(case: HeldCase) -> Check:
+def _oblique(case: HeldCase) -> GateCheck:
     """Let a box weigh obliquely on fingers that all push along x, and check when it slips."""
     bench = HeldBench(case.clamped_box())
-    _, start = bench.settled(paths.closing(SETTLE_S))
+    _, start = bench.settled(paths.closing(SQUEEZE_SETTLE_S))
     drive = _ramp(case, 0.0, np.array([0.0, math.sin(OBLIQUE), -math.cos(OBLIQUE)]))
     (motion,) = bench.run([drive], start)
     found = outcome(motion, drive, bench.scene.layout.friction)
@@ -286,14 +286,14 @@ def _oblique(case: HeldCase) -> Check:
 def _ramp(case: HeldCase, rising: float, way: Array = DOWN) -> Drive:
     """Return the drive in which a weight grows past slip, a part of it as the palm's rise."""
     low = (1.0 - WINDOW) / (1.0 + WINDOW)
-    share = np.concatenate([low * case.rise(), low + (1.0 - low) * case.rise(0.5 * SLOW)])
+    share = np.concatenate([low * case.rise(), low + (1.0 - low) * case.rise(0.5 * SLOW_RISE)])
     whole = (1.0 + WINDOW) * case.slip_n / case.object_kg * share[:, None] * way
     drive = replace(idle(len(share)), gravity=(1.0 - rising) * whole, shares=share)
     accelerations = np.hstack([-rising * whole, np.zeros((len(share), 3))])
     return replace(drive, accelerations=accelerations)
 
 
-def _creep(case: HeldCase, motion: HeldMotion) -> Check:
+def _creep(case: HeldCase, motion: HeldMotion) -> GateCheck:
     """Check how far contacts that stick creep in the time of the longest trial."""
     last, slid = _period(case), motion.slides()
     speed = float(np.abs(slid[-1] - slid[-last]).max()) / ((last - 1) * SAMPLE_S)
@@ -303,7 +303,7 @@ def _creep(case: HeldCase, motion: HeldMotion) -> Check:
     return little(name, motion, far, CREEP)
 
 
-def _jumps(case: HeldCase, motion: HeldMotion) -> Check:
+def _jumps(case: HeldCase, motion: HeldMotion) -> GateCheck:
     """Check the contact forces while a load comes and goes suddenly, sample by sample."""
     load, w, zeta = JUMP_SHARE * case.light_n, case.frequency, case.damping_ratio
     share = case.object_kg / case.moving_kg
@@ -331,17 +331,17 @@ def _period(case: HeldCase) -> int:
     return max(2, paths.samples(2.0 * math.pi / case.frequency))
 
 
-def _rings(case: HeldCase) -> list[Check]:
+def _rings(case: HeldCase) -> list[GateCheck]:
     """Knock the box along and about all axes at once, and check how fast each of them rings."""
     scene = case.held_box()
-    _, start = HeldBench(scene).settled(paths.closing(SETTLE_S))
+    _, start = HeldBench(scene).settled(paths.closing(SQUEEZE_SETTLE_S))
     stiff, mass, damper = _modes(case, np.diag(scene.layout.inertia_kg_m2))
     undamped = np.sqrt(stiff / mass)
     bench = HeldBench(scene, sample_s=min(SAMPLE_S, RADIANS / float(undamped.max())))
     a, b, _ = case.halves
     amplitude = KNOCKED * min(case.friction, 1.0) * case.push / case.stiffness_n_per_m
     sizes = amplitude / np.array([1.0, 1.0, 1.0, b, a, a + b])
-    count = round(PERIODS * 2.0 * math.pi / float(undamped.min()) / bench.sample_s) + SPARE
+    count = round(PERIODS * 2.0 * math.pi / float(undamped.min()) / bench.sample_s) + SPARE_SAMPLES
     wrenches = np.zeros((count, 6))
     wrenches[0] = mass * undamped * sizes / bench.sample_s
     (motion,) = bench.run([replace(idle(count), wrenches=wrenches)], start)
@@ -360,7 +360,7 @@ def _modes(case: HeldCase, inertia: Array) -> Array:
     """Return stiffness, mass and damping along and about x, y and z by (1), (3, 6)."""
     a, b, _ = case.halves
     k, push, rho = case.stiffness_n_per_m, case.push, case.tip_radius_m
-    damper = 2.0 * case.damping_ratio / math.sqrt(k * FINGERS / case.moving_kg)
+    damper = 2.0 * case.damping_ratio / math.sqrt(k * BOX_FINGERS / case.moving_kg)
     squares = np.array([b * b, a * a, a * a + b * b])
     geometric = 2.0 * push * np.array([b - rho, a - rho, a + b - 2.0 * rho])
     springs = k * np.array([4.0, 4.0, 4.0, *(2.0 * squares)])
@@ -389,13 +389,13 @@ FLIGHT_S = 0.2
 """Time in which the box flies after a knock [s]."""
 KNOCK_RAD_PER_S = 2.0
 """Rate of turning after a knock: the box turns by less than half a radian in its flight."""
-APART = 2.0
+FINGERS_APART = 2.0
 """Distance of the fingers from their contacts, in radii of the box."""
 RAISED = 4.0
 """Height of the lift, relative to the way by which the springs give under the weight."""
 
 
-def free_box(case: HeldCase) -> tuple[Check, ...]:
+def free_box(case: HeldCase) -> tuple[GateCheck, ...]:
     """Check the fall, the velocities after a knock, and what a table carries."""
     bench = HeldBench(case.held_box())
     steps, flight = round(FALL_S / SAMPLE_S), round(FLIGHT_S / SAMPLE_S)
@@ -405,7 +405,7 @@ def free_box(case: HeldCase) -> tuple[Check, ...]:
     wrenches[0, 5] = bench.scene.layout.inertia_kg_m2[2, 2] * KNOCK_RAD_PER_S / SAMPLE_S
     fall, knock = bench.run(
         [
-            _apart(case, bench, replace(idle(steps), gravity=np.tile(WEIGHT, (steps, 1)))),
+            _apart(case, bench, replace(idle(steps), gravity=np.tile(WEIGHT_M_PER_S2, (steps, 1)))),
             _apart(case, bench, replace(idle(flight), wrenches=wrenches)),
         ]
     )
@@ -425,16 +425,16 @@ def free_box(case: HeldCase) -> tuple[Check, ...]:
 def _apart(case: HeldCase, bench: HeldBench, drive: Drive) -> Drive:
     """Take the fingers and the table away from the box; the table faces it from above."""
     layout = bench.scene.layout
-    back = -APART * case.radius_m * layout.frames[:, :, 0]
+    back = -FINGERS_APART * case.radius_m * layout.frames[:, :, 0]
     reached = np.einsum("kij,ki->kj", layout.axes, back)
     above = Table(-AWAY * case.radius_m * DOWN, DOWN)
     return replace(drive, grasping=np.zeros(len(drive)), reached=reached, table=above)
 
 
-def _lifted(case: HeldCase, bench: HeldBench) -> tuple[Check, Check]:
+def _lifted(case: HeldCase, bench: HeldBench) -> tuple[GateCheck, GateCheck]:
     """Lift the box off a table, with a weight that its springs carry lightly."""
     weight = min(case.object_kg * GRAVITY_M_PER_S2, case.light_n)
-    height = RAISED * weight / (FINGERS * case.stiffness_n_per_m)
+    height = RAISED * weight / (BOX_FINGERS * case.stiffness_n_per_m)
     drive, begun = paths.lift(-DOWN, height, SAMPLE_S * len(case.rise()))
     share = weight / (case.object_kg * GRAVITY_M_PER_S2)
     table = Table(case.halves[2] * DOWN, -DOWN)
@@ -451,11 +451,11 @@ def _lifted(case: HeldCase, bench: HeldBench) -> tuple[Check, Check]:
 
 BLOW = 1.2
 """Largest force of the blow, relative to the pushes of all fingers."""
-WATCHED = 1.0
+PERIODS_WATCHED = 1.0
 """Time for which the box is watched, in periods of its motion along an axis."""
 LEAST_WATCHED = 8
 """Least number of samples for which it is watched."""
-SHORTER = 4
+STEPS_SHORTER = 4
 """How much shorter the steps are that it is compared with."""
 CHANGED = 0.25
 """Largest difference, over the largest displacement: steps of the usual length differ by 0.02 to
@@ -463,32 +463,32 @@ CHANGED = 0.25
 by 0.4 and more."""
 
 
-def struck_box(case: HeldCase) -> Check:
+def struck_box(case: HeldCase) -> GateCheck:
     """Check how much short steps change the motion of a box that is struck off its fingers."""
     scene, blow = case.held_box(), _blow(case)
-    step_s = held_physics(scene.layout).timestep / SHORTER
+    step_s = held_physics(scene.layout).timestep / STEPS_SHORTER
     motions = list[HeldMotion]()
     for bench in (HeldBench(scene), HeldBench(scene, step_s=step_s)):
-        _, start = bench.settled(paths.closing(SETTLE_S))
+        _, start = bench.settled(paths.closing(SQUEEZE_SETTLE_S))
         motions += bench.run([blow], start)
     here, there = (motion.shifts for motion in motions)
     changed = float(np.abs(here - there).max()) / max(float(np.abs(there).max()), SMALLEST)
     name = "motion of a box struck off its fingers that short steps change, over the largest"
     faulty = any(motion.health.fault for motion in motions)
-    return Check(name, math.nan if faulty else changed, 0.0, CHANGED)
+    return GateCheck(name, math.nan if faulty else changed, 0.0, CHANGED)
 
 
 def _blow(case: HeldCase) -> Drive:
     """Return the drive of half a sine of force along x, as long as a knock, and what follows."""
     strike = paths.samples(paths.STRIKE_S)
-    after = max(LEAST_WATCHED, paths.samples(WATCHED * 2.0 * np.pi / case.frequency))
+    after = max(LEAST_WATCHED, paths.samples(PERIODS_WATCHED * 2.0 * np.pi / case.frequency))
     wrenches = np.zeros((strike + after, 6))
     shape = np.sin(np.pi * (np.arange(strike) + 0.5) / strike)
-    wrenches[:strike, 0] = BLOW * FINGERS * case.push * shape
+    wrenches[:strike, 0] = BLOW * BOX_FINGERS * case.push * shape
     return replace(idle(len(wrenches)), wrenches=wrenches)
 
 
-def on_faces(case: HeldCase, name: str) -> tuple[Check, ...]:
+def on_faces(case: HeldCase, name: str) -> tuple[GateCheck, ...]:
     """Check normals, depths and forces of fingertips on each face of an object."""
     body = sized(name, case.radius_m)
     pieces = [(piece, face.normal) for face in body.faces for piece in face.pieces]
@@ -502,8 +502,8 @@ def on_faces(case: HeldCase, name: str) -> tuple[Check, ...]:
     into = DEPTH * case.radius_m * normals
     reached = np.einsum("kij,ki->kj", scene.layout.axes, into)
     found, depths = bench.touched(scene.layout.holder.tip_names, bench.placed(reached))
-    depths /= (DEPTH + TOUCH) * case.radius_m
-    motion, _ = bench.settled(paths.closing(SETTLE_S))
+    depths /= (DEPTH + TOUCH_DEPTH) * case.radius_m
+    motion, _ = bench.settled(paths.closing(SQUEEZE_SETTLE_S))
     forces = np.einsum("kij,kj->ki", scene.layout.axes, motion.forces[-1])
     missed = np.linalg.norm(forces - pushes[:, None] * normals, axis=1) / pushes
     return (

@@ -26,8 +26,9 @@ from grasp_core.closure.contacts import WRENCH, contact_frames
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from scenes.mujoco.mjcf_text import quaternion
 from scenes.settings import SAMPLE_S
-from sim_validate.engine import simulate
-from sim_validate.engine.simulate import smooth
+from sim_validate.engine import schedules
+from sim_validate.engine.misplacement import ObjectPose
+from sim_validate.engine.schedules import smooth
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,15 +45,6 @@ class Rows:
         """Return this value with the samples of a later one after its own."""
         pairs = ((name, (getattr(self, name), getattr(later, name))) for name in self.ROWS)
         return replace(self, **{name: np.concatenate(pair) for name, pair in pairs})
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Pose:
-    """Where the object lies, against its planned place in the hand."""
-
-    moved: Array
-    quaternion: Array
-    """Orientation (w, x, y, z), (4,)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,7 +77,7 @@ class Drive(Rows):
     """Share of the trial's load that is applied, (n,)."""
     velocity: Array
     """Velocity at which hand and object start, (3,) [m/s]."""
-    pose: Pose | None = None
+    pose: ObjectPose | None = None
     """Where the object lies at the start; None for its planned place."""
     reached: Array | None = None
     """Displacements of the fingertips along their springs at the start, (k, 3) [m], from where
@@ -139,7 +131,7 @@ STOP_RISE_S = 0.02
 
 def samples(duration_s: float) -> int:
     """Return the whole number of samples nearest to a duration, at least one."""
-    return simulate.samples(duration_s, SAMPLE_S)
+    return schedules.samples(duration_s, SAMPLE_S)
 
 
 def smoother(count: int) -> Array:

@@ -40,7 +40,7 @@ from grasp_core.errors import InputError
 from grasp_core.execution.first_slip import slip_steps
 from scenes.mujoco.held_scene import SAMPLE_S, HeldLayout, HeldScene, hinged, palm_armature
 from scenes.mujoco.mjcf_text import rotations
-from sim_validate.engine.simulate import FREE, PALM, Bench, Health, Motion, Told
+from sim_validate.engine.stepping import OBJECT_END, PALM_END, Bench, Health, Motion, Told
 from sim_validate.execution.paths import WHOLE, Drive, Rows, closing
 
 KEPT = ("qvel", "qfrc_constraint", "state")
@@ -93,7 +93,7 @@ class HeldMotion(Rows):
     @property
     def palm(self) -> Array:
         """Positions of the palm's slides and hinges, (n, 6) [m, rad]."""
-        return self.joints[:, 7 : PALM + 1]
+        return self.joints[:, 7 : PALM_END + 1]
 
     @cached_property
     def shifts(self) -> Array:
@@ -186,7 +186,7 @@ class HeldBench(Bench[HeldScene]):
         """Return the positions of all joints where fingertips are displaced along their springs."""
         joints = self.home.copy()
         if reached is not None:
-            joints[PALM + 1 :] = self.scene.layout.holder.joints(reached)
+            joints[PALM_END + 1 :] = self.scene.layout.holder.joints(reached)
         return joints
 
     def _told_by(self, drive: Drive, *, fresh: bool) -> Told:
@@ -222,18 +222,19 @@ class HeldBench(Bench[HeldScene]):
         joints, speeds, forces = (
             np.where(np.abs(each) < BOUNDLESS, each, np.nan) for each in (joints, speeds, forces)
         )
-        layout, palm, fingers = self.scene.layout, joints[:, 7 : PALM + 1], joints[:, PALM + 1 :]
+        palm, fingers = joints[:, 7 : PALM_END + 1], joints[:, PALM_END + 1 :]
+        layout = self.scene.layout
         object_turns = rotations(joints[:, 3:7])
         turned = hinged(palm[:, 3:]).transpose(0, 2, 1) @ object_turns
         # contact forces are those of the last step's start, from which speeds lead to its end
         back = -self.step_s * speeds
-        half = np.column_stack([np.ones(len(back)), 0.5 * back[:, 3:FREE]])
+        half = np.column_stack([np.ones(len(back)), 0.5 * back[:, 3:OBJECT_END]])
         half /= np.linalg.norm(half, axis=1)[:, None]
-        palm_then = hinged(palm[:, 3:] + back[:, FREE + 3 : PALM]).transpose(0, 2, 1)
+        palm_then = hinged(palm[:, 3:] + back[:, OBJECT_END + 3 : PALM_END]).transpose(0, 2, 1)
         pressed = palm_then @ object_turns @ rotations(half)
-        tips, _, turns = layout.holder.seen(fingers, forces[:, PALM:], turned)
-        before = fingers + back[:, PALM:]
-        _, contact, _ = layout.holder.seen(before, forces[:, PALM:], pressed)
+        tips, _, turns = layout.holder.seen(fingers, forces[:, PALM_END:], turned)
+        before = fingers + back[:, PALM_END:]
+        _, contact, _ = layout.holder.seen(before, forces[:, PALM_END:], pressed)
         if turns is None:
             turns = np.broadcast_to(np.eye(3), (length, 1, 3, 3))
         table = forces[:, :3] - np.einsum("kij,nkj->ni", layout.axes, contact)
@@ -258,7 +259,7 @@ class _Losing:
             gone = np.linalg.norm(away, axis=1) > self.most_m[going]
             if self.turns_count:
                 now = joints[going]
-                palm = hinged(now[:, 10 : PALM + 1]).transpose(0, 2, 1)
+                palm = hinged(now[:, 10 : PALM_END + 1]).transpose(0, 2, 1)
                 gone |= cosines(palm @ rotations(now[:, 3:7])) < self.least_cosine[going]
         if not gone.any():
             return samples + 1

@@ -3,9 +3,7 @@
 In `misplaced` the object is moved by a stated distance and turned by a stated angle, both in
 directions drawn by a seed, or by errors that are drawn too. Each fingertip comes along its normal
 until it touches, as far behind its planned place as the object can have moved; one that meets
-nothing stops as far beyond it. From there the squeeze is commanded as planned. A fingertip advances
-by its distance from the surface less its radius, so it never passes the first point that it meets
-(sphere tracing, Hart 1996).
+nothing stops as far beyond it (see `misplacement`). From there the squeeze is commanded as planned.
 
 In `lift` the object rests on a table, on a face of its convex hull that carries its centre of mass:
 the centre, dropped onto the face, lies inside. An object that is thrown and settles without sliding
@@ -29,13 +27,13 @@ Where (1) leaves a cone, a contact slides while the fingers close, and that coun
 
 import importlib
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices, to_digits
+from grasp_core.arrays import Array, to_digits
 from grasp_core.closure.contacts import grasp_map, unit_size
 from grasp_core.closure.decision import decide
 from grasp_core.closure.proofs import ContactCones
@@ -50,72 +48,43 @@ from grasp_core.objects.shells import solid_angles
 from grasp_core.solvers.ties import first_best, largest_first
 from scenes.mujoco.held_scene import HeldLayout
 from scenes.mujoco.mjcf_text import quaternion, rotations
-from scenes.mujoco.scene_text import TOUCH
+from scenes.mujoco.scene_text import TOUCH_DEPTH
+from sim_validate.engine.misplacement import MEETS, Balls, ObjectPose, drawn_errors, turned_by
 from sim_validate.execution import paths
-from sim_validate.execution.paths import Drive, Pose, Table
+from sim_validate.execution.paths import Drive, Table
 from sim_validate.execution.simulate import SLID, HeldBench, HeldMotion, outcome
 from sim_validate.execution.verdict import ExecutionControl, Skipped
-from sim_validate.settings import ExecutionSettings, OffBy, TrialKind
+from sim_validate.settings import ExecutionSettings, TrialKind
 
-MET = 1e-7
-"""Distance from the surface at which a fingertip has met it, in object radii."""
-MOST_STEPS = 100
-"""Advances after which a fingertip stops: beside a surface that it nearly grazes they are tiny."""
-ROOM = 1.5
+ROOM_TO_COME = 1.5
 """Distance from which fingertips come, relative to how far points of the object can have moved."""
 
 
-def errors(count: int, seed: int, off_by: OffBy) -> Array:
-    """Draw errors of place and turn, (count, 2, 3), of length one or of deviation one."""
-    drawn = np.random.default_rng(seed).normal(size=(count, 2, 3))
-    return drawn if off_by == "deviation" else drawn / np.linalg.norm(drawn, axis=2, keepdims=True)
-
-
-def misplacements(layout: HeldLayout, off_m: Array, off_rad: Array) -> tuple[Pose, ...]:
+def misplaced_poses(layout: HeldLayout, off_m: Array, off_rad: Array) -> tuple[ObjectPose, ...]:
     """Return poses of the object that is off by translations and turns, (count, 3) each."""
-    poses = list[Pose]()
-    for way, turning in zip(off_m, off_rad, strict=True):
-        angle = float(np.linalg.norm(turning))
-        axis = turning / (angle or 1.0)
-        turn = np.concatenate([[math.cos(0.5 * angle)], math.sin(0.5 * angle) * axis])
-        turned = rotations(to_digits(turn / np.linalg.norm(turn))[None])[0]
-        poses.append(Pose(to_digits(way, layout.radius_m), quaternion(turned)))
-    return tuple(poses)
+    turned = [rotations(to_digits(turned_by(turning))[None])[0] for turning in off_rad]
+    return tuple(
+        ObjectPose(to_digits(way, layout.radius_m), quaternion(rotation))
+        for way, rotation in zip(off_m, turned, strict=True)
+    )
 
 
-def met(layout: HeldLayout, poses: tuple[Pose, ...], off_m: float, off_rad: float) -> Array:
+def tips_met(
+    layout: HeldLayout, poses: Sequence[ObjectPose], off_m: float, off_rad: float
+) -> Array:
     """Return where fingertips stop, from their planned places along springs, (poses, k, 3) [m]."""
-    ways = layout.frames[:, :, 0]
-    room = ROOM * (off_m + off_rad * layout.radius_m)
-    starts = layout.tip_centers - room * ways
-    turned = np.array([rotations(pose.quaternion[None])[0] for pose in poses])
-    moved = np.array([pose.moved for pose in poses])
-    starts = np.einsum("pji,pkj->pki", turned, starts[None] - moved[:, None])
-    ways = np.einsum("pji,kj->pki", turned, ways)
-    radii = layout.tip_radius_m - TOUCH * layout.radius_m
-    gone = np.zeros(starts.shape[:2])
-    middles = starts + room * ways
-    near = [_near(layout, middles[:, finger], room) for finger in range(len(radii))]
-    for _ in range(MOST_STEPS):
-        centers = starts + gone[..., None] * ways
-        nearest = np.stack(
-            [
-                nearest_on_surface(layout.vertices, triangles, centers[:, finger])
-                for finger, triangles in enumerate(near)
-            ],
-            axis=1,
-        )
-        gaps = np.linalg.norm(nearest - centers, axis=2) - radii
-        open_ = (gaps > MET * layout.radius_m) & (gone < 2.0 * room)
-        if not open_.any():
-            break
-        gone = np.where(open_, np.minimum(gone + gaps, 2.0 * room), gone)
-    back = (to_digits(gone, layout.radius_m) - room)[..., None] * layout.frames[:, :, 0]
+    ways, room = layout.frames[:, :, 0], ROOM_TO_COME * (off_m + off_rad * layout.radius_m)
+    balls = Balls(
+        layout.vertices, layout.triangles, layout.radius_m,
+        layout.tip_radius_m - TOUCH_DEPTH * layout.radius_m, layout.tip_centers - room * ways, ways,
+        room,
+    )  # fmt: skip
+    back = (balls.met(poses) - room)[..., None] * ways
     return np.einsum("kij,pki->pkj", layout.axes, back)
 
 
-def closed_there(layout: HeldLayout, pose: Pose, tips: Array) -> bool | None:
-    """Decide whether fingertips that stop as `met` says hold a moved object in force closure.
+def closed_there(layout: HeldLayout, pose: ObjectPose, tips: Array) -> bool | None:
+    """Decide whether fingertips that stop as `tips_met` says hold a moved object in force closure.
 
     None where it is too close to decide.
     """
@@ -123,27 +92,15 @@ def closed_there(layout: HeldLayout, pose: Pose, tips: Array) -> bool | None:
     centers = centers @ rotations(pose.quaternion[None])[0]
     contacts = nearest_on_surface(layout.vertices, layout.triangles, centers)
     normals, gaps = contacts - centers, np.linalg.norm(contacts - centers, axis=1)
-    if (gaps > layout.tip_radius_m + MET * layout.radius_m).any():
+    if (gaps > layout.tip_radius_m + MEETS * layout.radius_m).any():
         return False
     arms, _, _ = unit_size(contacts[None])
     return decide(ContactCones.at(arms[0], normals / gaps[:, None], layout.friction)).closed
 
 
-def _near(layout: HeldLayout, middles: Array, room: float) -> Indices:
-    """Return the triangles, (t, 3), that can be the nearest to a point within `room` of others."""
-    # with the surface at d from a middle, one beyond d + 2 room from it is nowhere the nearest
-    corners = layout.vertices[layout.triangles]
-    nearest = nearest_on_surface(layout.vertices, layout.triangles, middles)
-    reach = np.linalg.norm(nearest - middles, axis=1) + 2.0 * room + MET * layout.radius_m
-    centers = corners.mean(axis=1)
-    extents = np.linalg.norm(corners - centers[:, None], axis=2).max(axis=1)
-    distances = np.linalg.norm(centers - middles[:, None], axis=2) - extents
-    return layout.triangles[(distances <= reach[:, None]).any(axis=0)]
-
-
-FLAT = 1e-6
+FACET_SLACK = 1e-6
 """Difference of normals, and of offsets in object radii, up to which facets are one face."""
-CLEAR = 0.01
+TABLE_GAP = 0.01
 """Least gap between fingertips and the table, in object radii."""
 
 
@@ -169,8 +126,8 @@ def rests(body: Polyhedron) -> tuple[Rest, ...]:
     for first in range(len(normals)):
         if first not in left:
             continue
-        alike = (np.abs(normals - normals[first]).max(axis=1) <= FLAT) & (
-            np.abs(offsets - offsets[first]) <= FLAT
+        alike = (np.abs(normals - normals[first]).max(axis=1) <= FACET_SLACK) & (
+            np.abs(offsets - offsets[first]) <= FACET_SLACK
         )
         own = [facet for facet in np.flatnonzero(alike) if facet in left]
         left -= set(own)
@@ -188,13 +145,13 @@ def rests(body: Polyhedron) -> tuple[Rest, ...]:
 def resting(body: Polyhedron, tips: Array, radii: Array) -> Rest | None:
     """Return the likeliest rest in which no fingertip meets the table; None if there is none."""
     for rest in rests(body):
-        if (tips @ rest.down + radii).max() <= rest.height - CLEAR * body.radius:
+        if (tips @ rest.down + radii).max() <= rest.height - TABLE_GAP * body.radius:
             return rest
     return None
 
 
-AXES = ("x", "y", "z")
-SIDES = tuple((sign, axis) for axis in range(3) for sign in (1.0, -1.0))
+AXIS_LETTERS = ("x", "y", "z")
+SIGNED_AXES = tuple((sign, axis) for axis in range(3) for sign in (1.0, -1.0))
 """Sign and axis of the six directions of stops and knocks."""
 OF_NO_SIZE: dict[TrialKind, str] = {"shake": "shake_g", "knock": "knock_n_s"}
 """Setting whose zero leaves no trial of a kind."""
@@ -256,15 +213,15 @@ def _lift(body: Polyhedron, layout: HeldLayout, settings: ExecutionSettings) -> 
 
 def _shakes(layout: HeldLayout, settings: ExecutionSettings) -> Iterator[Trial]:
     size = GRAVITY_M_PER_S2 * settings.shake_g
-    sizes = np.repeat([size, size / layout.radius_m], len(AXES))
-    names = [f"shake {how} {axis}" for how in ("along", "about") for axis in AXES]
+    sizes = np.repeat([size, size / layout.radius_m], len(AXIS_LETTERS))
+    names = [f"shake {how} {axis}" for how in ("along", "about") for axis in AXIS_LETTERS]
     for name, axis in zip(names, np.diag(sizes), strict=True):
         drive = paths.shake(layout.gravity, axis, settings.shake_hz)
         yield Trial("shake", name, drive, 0, weighing=paths.WEIGHING)
 
 
 def _stops(layout: HeldLayout, settings: ExecutionSettings) -> Iterator[Trial]:
-    for sign, axis in SIDES:
+    for sign, axis in SIGNED_AXES:
         way = sign * np.eye(3)[axis]
         drive = paths.stop(layout.gravity, way, settings.stop_m_per_s2, settings.stop_from_m_per_s)
         yield Trial("stop", f"stop {_side(sign, axis)}", drive, 0, weighing=paths.WEIGHING)
@@ -272,7 +229,7 @@ def _stops(layout: HeldLayout, settings: ExecutionSettings) -> Iterator[Trial]:
 
 def _knocks(layout: HeldLayout, settings: ExecutionSettings) -> Iterator[Trial]:
     """Yield knocks along both sides of each axis, half the object's radius beside its middle."""
-    for sign, axis in SIDES:
+    for sign, axis in SIGNED_AXES:
         point = 0.5 * layout.radius_m * np.eye(3)[(axis + 1) % 3]
         drive = paths.knock(layout.gravity, sign * settings.impulse_n_s * np.eye(3)[axis], point)
         yield Trial("knock", f"knock {_side(sign, axis)}", drive, 0, weighing=paths.WEIGHING)
@@ -280,10 +237,10 @@ def _knocks(layout: HeldLayout, settings: ExecutionSettings) -> Iterator[Trial]:
 
 def _misplaced(layout: HeldLayout, settings: ExecutionSettings) -> Iterator[Trial]:
     off_m, off_rad = settings.off_mm / 1000.0, math.radians(settings.off_deg)
-    off = errors(settings.misplacements, settings.seed, settings.off_by)
-    poses = misplacements(layout, off_m * off[:, 0], off_rad * off[:, 1])
+    off = drawn_errors(settings.misplacements, settings.seed, settings.off_by)
+    poses = misplaced_poses(layout, off_m * off[:, 0], off_rad * off[:, 1])
     farthest, widest = np.linalg.norm(off, axis=2).max(axis=0)
-    reached = met(layout, poses, float(farthest) * off_m, float(widest) * off_rad)
+    reached = tips_met(layout, poses, float(farthest) * off_m, float(widest) * off_rad)
     closing, weight = paths.closing(), paths.weighed(layout.gravity)
     for place, (pose, tips) in enumerate(zip(poses, reached, strict=True)):
         drive = replace(closing.then(weight), pose=pose, reached=tips)
@@ -295,11 +252,11 @@ def _misplaced(layout: HeldLayout, settings: ExecutionSettings) -> Iterator[Tria
 
 
 def _side(sign: float, axis: int) -> str:
-    return f"{'+' if sign > 0.0 else '-'}{AXES[axis]}"
+    return f"{'+' if sign > 0.0 else '-'}{AXIS_LETTERS[axis]}"
 
 
-FRICTION = 0.9
-SQUEEZE = 0.9
+WEAK_FRICTION = 0.9
+WEAK_SQUEEZE = 0.9
 """Friction and squeeze of the controls, relative to the trials'."""
 SURE = 1.25
 """Load of a control, relative to that at which the analysis says that it slips: fingertips that
@@ -356,10 +313,11 @@ def weaker_grips(best: BestSqueeze, layout: HeldLayout) -> Iterator[Weaker]:
     """Yield the weaker grips of a chosen squeeze, with their loads."""
     grip, load = best.grip, slipping_load(best)
     all_push = np.ones(len(grip.friction))
-    little = replace(grip, friction=FRICTION * grip.friction)
-    yield Weaker(f"friction {FRICTION:g}", little.friction, all_push, _sure(little, load) * load)
-    loose, pushing = grip.squeezed(SQUEEZE * grip.squeeze), SQUEEZE * all_push
-    yield Weaker(f"squeeze {SQUEEZE:g}", grip.friction, pushing, _sure(loose, load) * load)
+    little = replace(grip, friction=WEAK_FRICTION * grip.friction)
+    name = f"friction {WEAK_FRICTION:g}"
+    yield Weaker(name, little.friction, all_push, _sure(little, load) * load)
+    loose, pushing = grip.squeezed(WEAK_SQUEEZE * grip.squeeze), WEAK_SQUEEZE * all_push
+    yield Weaker(f"squeeze {WEAK_SQUEEZE:g}", grip.friction, pushing, _sure(loose, load) * load)
     strongest = first_best(layout.pushes.max(axis=1))
     others_push = all_push.copy()
     others_push[strongest] = 0.0

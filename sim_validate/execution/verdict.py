@@ -18,9 +18,9 @@ from grasp_core.figures import Compared, Shown, cell, figure, less, more
 from grasp_core.files.file_kinds import EXECUTIONS
 from grasp_core.files.records import UNRECORDED
 from grasp_core.kinds import FLAT, Number, OrInfinity, Quantity, path_of
-from grasp_core.messages import FieldError
+from grasp_core.messages import MILLI, FieldError
 from grasp_core.solvers.ties import first_best
-from scenes.settings import PhysicsSettings
+from scenes.mujoco_options import PhysicsSettings
 from sim_validate.files.result_files import AboutGrasps
 from sim_validate.settings import ExecutionSettings, TrialKind
 
@@ -36,7 +36,7 @@ CLEAR_OF_SLIP = 1.05
 FEWEST_CONTACTS = 2
 MULTIPLE = ".2f"
 """How multiples of loads are shown."""
-MILLI, DEGREES = 1e3, math.degrees(1.0)
+DEGREES = math.degrees(1.0)
 UNKNOWN = "-"
 """What stands for a motion that the simulator could not follow."""
 LOSSES = Compared(items=("no longer survived", "survived now"))

@@ -22,6 +22,7 @@ from grasp_core.files.records import RecordFile, record_of
 from grasp_core.hands.hand import Coupling, Hand
 from grasp_core.hands.hand_motors import hand_payload
 from grasp_core.hands.reach import HandReach, reach_with, uncoupled
+from grasp_core.messages import MILLI
 from grasp_core.names import HANDS
 from grasp_core.objects.polyhedron import Polyhedron, is_convex
 from grasp_core.planning.result import Plan
@@ -246,7 +247,6 @@ def write_records(
     reporter.say(f"wrote {counted(len(poses), 'record')} of DexGraspBench to {folder}")
 
 
-MM = 1e3
 SMALL_RANGE = math.radians(10.0)
 """Fingers whose joints all turn by less hardly open [rad]."""
 SHAPES_WEIGH = "MuJoCo gives links without inertia in the file that of their shapes at 1,000 kg/m^3"
@@ -264,7 +264,7 @@ def show_hand(command: hand_flags.Hand, reporter: Reporter) -> int:
     reporter.document(record_of(hand))
     fingers = [
         (
-            f.name, str(len(f.links)), f"{MM * f.tip.radius:.1f}",
+            f.name, str(len(f.links)), f"{MILLI * f.tip.radius:.1f}",
             "ball" if f.tip.corners is None else f"block of {len(f.tip.corners)} corners",
             str(sum(len(link.shapes) for link in f.links)),
         )

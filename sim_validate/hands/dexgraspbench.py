@@ -50,7 +50,7 @@ from grasp_core.messages import UnfitError
 from grasp_core.objects.on_faces import check_body, face_under
 from grasp_core.objects.polyhedron import Polyhedron, is_convex
 from grasp_core.values import Contact
-from scenes.mujoco.mjcf_text import quaternion, rotations
+from scenes.mujoco.mjcf_text import IDENTITY_POSE, quaternion, rotations
 from scenes.mujoco.published_tests import HandServos, Postures
 
 FREE = 7
@@ -371,7 +371,7 @@ def dex_record(
     if gap_m is not None:
         opened = _opened_by(stance, opened, value_of(Quantity, gap_m, "gap_m"))
     return DexRecord(
-        object_path, 1.0, np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]),
+        object_path, 1.0, IDENTITY_POSE,
         *(np.concatenate([root, joints]) for joints in (opened, stance.joints,
                                                         stance.joints + to_digits(told))),
     )  # fmt: skip

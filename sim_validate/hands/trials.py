@@ -71,17 +71,14 @@ from scenes.mujoco.held_scene import HeldScene
 from scenes.settings import FingerSettings
 from sim_validate.closure.validate import held_wrenches
 from sim_validate.closure.verdict import HoldsWrenches, WrenchVerdict
-from sim_validate.engine.gate import Check, measured, require_faithful, two_digits
-from sim_validate.engine.limits_and_friction import (
-    Analysis,
-    PlannedLoad,
-    closed_on,
-    part,
-    ramped_limits,
-    squeezed,
-)
+from sim_validate.engine.gate import ClosureCase
+from sim_validate.engine.known_cases import GateCheck, checked, two_digits
+from sim_validate.engine.planned_loads import LoadPlanner, PlannedLoad
+from sim_validate.engine.rig import closed_on, squeezed
+from sim_validate.engine.schedules import TrialLoad, part
 from sim_validate.engine.setup import WEAKEST, Agenda, Setup
-from sim_validate.engine.simulate import Bench, Load
+from sim_validate.engine.simulated_limits import ramped_limits
+from sim_validate.engine.stepping import Bench
 from sim_validate.engine.traces import LET_GO, HoldVerdict, judge
 from sim_validate.execution.execute import asked_settings, execution_of, result_of
 from sim_validate.execution.predictions import Holder
@@ -122,7 +119,7 @@ class HandControl(Declared):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class HandCase(Analysis):
+class HandCase(LoadPlanner):
     """A hand's contacts and motors, from which its controls are made."""
 
     motors: Motors
@@ -202,17 +199,17 @@ class KnownHand:
     setup: Setup
     friction: float
 
-    def checks(self) -> tuple[Check, ...]:
+    def checks(self) -> tuple[GateCheck, ...]:
         """Measure what it resists, and how far it gives way, over the exact figures."""
         body, reach, setup = cube(), stance(self.friction), self.setup
         scene = build_hand_scene(hinged_hand(), body, reach, self.friction, physics=setup.physics)
         return (*_limits(scene, body, reach, setup), _displaced(scene, setup))
 
 
-def require_faithful_hands(setup: Setup, friction: float) -> tuple[Check, ...]:
+def require_faithful_hands(setup: Setup, friction: float) -> tuple[GateCheck, ...]:
     """Check the simulator on the known hand, and refuse settings under which a check fails."""
     plain = replace(setup, threads=1, timeout_s=math.inf)
-    return measured(KnownHand(plain, two_digits(friction))).require("no hand is simulated").checks
+    return checked(KnownHand(plain, two_digits(friction))).checks
 
 
 def cube() -> Polyhedron:
@@ -246,7 +243,7 @@ def stance(friction: float) -> HandReach:
 
 def _limits(
     scene: HandScene, body: Polyhedron, reach: HandReach, setup: Setup
-) -> tuple[Check, ...]:
+) -> tuple[GateCheck, ...]:
     friction, press = scene.layout.friction, TORQUE / HEIGHT
     exact = {
         "across the contacts": (np.eye(6)[2], 4.0 * friction * press),
@@ -254,19 +251,22 @@ def _limits(
         "against one finger": (np.eye(6)[0], (1.0 + 2.0 * friction) * press),
     }
     rig = closed_on(scene, setup, friction)
-    resisted = Analysis(body, reach.contacts or (), friction, setup, scene.hand.motors).resisted
+    resisted = LoadPlanner(body, reach.contacts or (), friction, setup, scene.hand.motors).resisted
     loads = [
-        Load(size * wrench, limit_of(resisted, wrench).forces) for wrench, size in exact.values()
+        TrialLoad(size * wrench, limit_of(resisted, wrench).forces)
+        for wrench, size in exact.values()
     ]
     found = ramped_limits(rig, loads)
     return tuple(
-        Check(f"limit of motors {name}, over the exact one", math.nan if at is None else at.share,
-              *LIMIT)
+        GateCheck(
+            f"limit of motors {name}, over the exact one", math.nan if at is None else at.share,
+            *LIMIT,
+        )
         for name, at in zip(exact, found, strict=True)
     )  # fmt: skip
 
 
-def _displaced(scene: HandScene, setup: Setup) -> Check:
+def _displaced(scene: HandScene, setup: Setup) -> GateCheck:
     smooth = scene.limited(scene.hand.motors.limits, SLIPPERY)
     layout = smooth.layout
     # without the grasp's own friction forces, which slippery contacts do not carry
@@ -274,9 +274,9 @@ def _displaced(scene: HandScene, setup: Setup) -> Check:
     patient = replace(setup, hold=replace(setup.hold, settle_s=SETTLE_S))
     rig = squeezed(Bench(smooth), patient, forces, SLIPPERY)
     size = GENTLE * TORQUE / HEIGHT
-    (poses,) = rig.joints(rig.holds([Load(size * np.eye(6)[0], forces)]))
+    (poses,) = rig.joints(rig.holds([TrialLoad(size * np.eye(6)[0], forces)]))
     exact = size * HEIGHT**2 / (2.0 * smooth.hand.servo)
-    return Check(
+    return GateCheck(
         "displacement by the servos, over the exact one", float(poses[-1, 0]) / exact, *SOFTER
     )
 
@@ -310,7 +310,7 @@ class HandVerdict(HoldsWrenches):
     controls: tuple[HandControlVerdict, ...]
     setup: Setup
     agenda: Agenda
-    checks: Annotated[tuple[Check, ...], UNRECORDED] = field(default=(), compare=False)
+    checks: Annotated[tuple[GateCheck, ...], UNRECORDED] = field(default=(), compare=False)
     """Cases with known answers on which the simulator was checked first."""
     scene: Annotated[HandScene | None, UNRECORDED] = field(default=None, compare=False)
     """The scene that was simulated; None if the verdict was read from a file."""
@@ -400,7 +400,7 @@ def validate_hand(
     contacts = stance_of(hand, reach).contacts
     if not force_closure(contacts, friction=friction).closed:
         raise InputError(f"the contacts of {reach.grasp} are not in force closure at {friction}")
-    gate = require_faithful(setup, friction, body.radius)
+    gate = checked(ClosureCase.of(setup, friction, body.radius))
     checks = (*gate.checks, *require_faithful_hands(setup, friction))
     layout, high = scene.layout, setup.hold.settling_friction * friction
     rig = closed_on(scene, setup, layout.friction, high)
@@ -421,12 +421,12 @@ def validate_hand(
 
 
 def _held(
-    scene: HandScene, setup: Setup, high: float, control: HandControl, limit: Load
+    scene: HandScene, setup: Setup, high: float, control: HandControl, limit: TrialLoad
 ) -> HoldVerdict:
     """Hold what a control must let go of, after the high friction of the grasp itself."""
     weak = scene.limited(control.limits, control.friction)
     rig = closed_on(weak, setup, weak.layout.friction, high)
-    (trace,) = rig.hold([part(rig.idle, limit, control.share)], [high])
+    (trace,) = rig.traced(rig.holds([part(rig.idle, limit, control.share)], [high]))
     return judge(trace, scene.layout, setup.hold)
 
 

@@ -13,6 +13,7 @@ from grasp_core.cones.spanning import count_spanning
 from grasp_core.declared import Declared, declared
 from grasp_core.figures import Shown
 from grasp_core.files.records import record_of
+from grasp_core.messages import MILLI
 from grasp_core.objects.planar_faces import MAX_FACES
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.surface import Face
@@ -24,7 +25,7 @@ from sim_validate.commands.console import Reporter
 from sim_validate.commands.exit_codes import Exit
 from sim_validate.planning.asked_objects import load_object
 
-MM, CM3 = 1e3, 1e6
+CM3 = 1e6
 MM2 = 1e6
 ALONG_AXIS = 1e-4
 """Largest angle from an axis at which a face counts as facing along it [rad]."""
@@ -94,8 +95,8 @@ def _sentences(body: Polyhedron, facts: dict[str, Any]) -> Iterator[str]:
     yield (
         f"{'It' if body.surface.closed else 'Its convex hull'} encloses a volume of "
         f"{CM3 * body.volume:.4g} cm^3, and it reaches "
-        f"{MM * body.radius:.4g} mm from its centre of mass, which is at "
-        f"{vector(np.round(MM * body.center_of_mass, 3))} mm."
+        f"{MILLI * body.radius:.4g} mm from its centre of mass, which is at "
+        f"{vector(np.round(MILLI * body.center_of_mass, 3))} mm."
     )
     if (spanning := facts["spanning_quadruples"]) is not None:
         yield (
@@ -119,8 +120,8 @@ def _on_faces(body: Polyhedron, facts: dict[str, Any]) -> str:
     return (
         f"Its surface is curved: fingers may stand on {len(body.faces)} nearly flat patches, which "
         f"turn by {facts['largest_spread_deg']:.2g} deg at most ({asked.spread_deg:.4g} deg "
-        f"allowed) and are {MM * facts['largest_depth_m']:.2g} mm deep at most ({asked.depth:.4g} "
-        "of its extent allowed)."
+        f"allowed) and are {MILLI * facts['largest_depth_m']:.2g} mm deep at most "
+        f"({asked.depth:.4g} of its extent allowed)."
     )
 
 
@@ -139,7 +140,7 @@ def _place(face: Face) -> str:
     outward = (-face.normal).tolist()
     axis = max(range(3), key=lambda index: abs(outward[index]))
     across = math.hypot(*(each for index, each in enumerate(outward) if index != axis))
-    center = [f"{0.0 if abs(MM * each) < NOTHING_MM else MM * each:.5g}"
+    center = [f"{0.0 if abs(MILLI * each) < NOTHING_MM else MILLI * each:.5g}"
               for each in face.centroid.tolist()]  # fmt: skip
     if across <= ALONG_AXIS:
         name, sign = "xyz"[axis], "+" if outward[axis] > 0.0 else "-"

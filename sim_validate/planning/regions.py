@@ -25,6 +25,7 @@ from grasp_core.figures import Shown, figures
 from grasp_core.files.file_kinds import REGIONS
 from grasp_core.geometry.polygons import FEWEST_CORNERS, edge_rows, plane_frame
 from grasp_core.kinds import FLAT, Count, NotNegative, Share, number, path_of
+from grasp_core.messages import MILLI
 from grasp_core.names import Family
 from grasp_core.objects.face_pieces import inscribed_radius
 from grasp_core.objects.polyhedron import Polyhedron
@@ -47,7 +48,6 @@ from sim_validate.settings import Certifying
 
 PROOFS = "proofs"
 """Folder of the proof files, beside `regions.json`."""
-MILLI = 1e3
 POLYGONS = tuple(f"region{i}_m" for i in range(FINGERS))
 BORDERS = tuple(f"border{i}_m" for i in range(FINGERS))
 FIELDS: Mapping[str, str] = {

@@ -12,6 +12,7 @@ from grasp_core.files.file_kinds import GRASPS, TRANSFER
 from grasp_core.files.text_files import write_text
 from grasp_core.kinds import FLAT
 from grasp_core.mesh_files.limits import MeshChoices
+from grasp_core.messages import MILLI
 from grasp_core.objects.on_faces import check_planar
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.result import Outcomes, Plan, PlanCounts
@@ -36,7 +37,6 @@ from sim_validate.files.result_files import AboutObject, ResultFile
 from sim_validate.files.results_folder import remove_results
 from sim_validate.planning.asked_objects import asked_grasps, load_object
 
-MM = 1e3
 NO_FIGURE = "-"
 COLUMNS = ("grasp", "status", "mm", "deg", "mu*", "now", "quality N", "now", "faces")
 """How far contacts moved and turned, what they reach, and faces under them that changed."""
@@ -143,7 +143,7 @@ def _show(found: Transfer, reporter: Reporter) -> None:
     counts = ", ".join(f"{found.count(status)} {status}" for status in CHANGES)
     reporter.say(
         f"{len(found.carried)} of {len(found.grasps)} grasps were carried over, with contacts "
-        f"that may move by {MM * found.distance:.4g} mm: {counts}"
+        f"that may move by {MILLI * found.distance:.4g} mm: {counts}"
     )
     for each in shown:
         if each.status in BAD_CHANGES:
@@ -155,7 +155,7 @@ def _show(found: Transfer, reporter: Reporter) -> None:
 def _row(each: CarriedGrasp, changed: set[int]) -> tuple[str, ...]:
     moved = turned = NO_FIGURE
     if all(contact.contact is not None for contact in each.contacts):
-        moved = f"{MM * max(contact.distance for contact in each.contacts):.2f}"
+        moved = f"{MILLI * max(contact.distance for contact in each.contacts):.2f}"
         turned = f"{math.degrees(max(contact.turn for contact in each.contacts)):.2f}"
     old, new = _figures(each.before), _figures(each.after)
     faces = ", ".join(map(str, sorted(changed & {*each.old.faces}))) or NO_FIGURE

@@ -27,23 +27,28 @@ from grasp_core.arrays import Array
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach, stance_of
 from grasp_core.kinds import Friction, instance, one_of, value_of
+from grasp_core.messages import MILLI
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
 from scenes.mujoco.closure_scene import Scene
+from scenes.mujoco.fingertips import Slides
 from scenes.mujoco.hand_scenes import build_hand_scene
+from scenes.mujoco.mjcf_text import IDENTITY_POSE
 from scenes.mujoco.published_tests import TestedObject, TestedScene
-from scenes.mujoco.scene_text import Slides
-from sim_validate.engine.gate import misplaced, require_faithful
-from sim_validate.engine.limits_and_friction import Analysis, closed_on
+from sim_validate.engine.gate import ClosureCase
+from sim_validate.engine.known_cases import checked, untouching
+from sim_validate.engine.planned_loads import LoadPlanner
+from sim_validate.engine.rig import closed_on
+from sim_validate.engine.schedules import samples
 from sim_validate.engine.setup import Setup
-from sim_validate.engine.simulate import Bench, Motion, Told, samples
+from sim_validate.engine.stepping import Bench, Motion, Told
 from sim_validate.engine.traces import Outcome, judge, rotation_angles
 from sim_validate.execution.execute import given_contacts
 from sim_validate.hands.dexgraspbench import RecordedReach, hand_file, recorded_postures
 from sim_validate.hands.trials import hand_setup, require_faithful_hands
 from sim_validate.processes.own_faults import OWN_FAULTS
-from sim_validate.protocols.published import PROTOCOLS, Passing, PublishedProtocol, Run
+from sim_validate.protocols.published import PROTOCOLS, Passing, ProtocolRun, PublishedProtocol
 from sim_validate.protocols.verdict import Judgement, OurVerdict, RunVerdict
 
 
@@ -78,10 +83,10 @@ def judge_by(
     setup = Setup() if setup is None else instance(setup, Setup, "setup")
     contacts = given_contacts(body, grasp)
     given = grasp if isinstance(grasp, Grasp) else contacts
-    require_faithful(setup, friction, body.radius)
+    checked(ClosureCase.of(setup, friction, body.radius))
     scene = _tested(found, body).by_fingertips(given, setup.fingers)
     ours = our_verdict(
-        Analysis(body, contacts, friction, setup, None), found.forces(scene.mass_kg),
+        LoadPlanner(body, contacts, friction, setup, None), found.forces(scene.mass_kg),
         partial(setup.scene, body, given, friction),
     )  # fmt: skip
     return _judged(
@@ -171,11 +176,11 @@ def _ours(
     """Judge a hand by our trials; contacts that were proved open need none."""
     if isinstance(reach, RecordedReach) and not reach.reached:
         return OurVerdict(False, False, 0.0, reach.explanation)
-    require_faithful(setup, friction, body.radius)
+    checked(ClosureCase.of(setup, friction, body.radius))
     require_faithful_hands(setup, friction)
     held = build_hand_scene(hand, body, reach, friction, physics=setup.physics)
     contacts = stance_of(hand, reach).contacts
-    analysis = Analysis(body, contacts, friction, setup, held.hand.motors)
+    analysis = LoadPlanner(body, contacts, friction, setup, held.hand.motors)
     return our_verdict(analysis, forces, lambda: held)
 
 
@@ -187,7 +192,7 @@ def _protocol(given: str | PublishedProtocol) -> PublishedProtocol:
 
 
 def our_verdict(
-    analysis: Analysis, forces: Sequence[Array], scene: Callable[[], Scene]
+    analysis: LoadPlanner, forces: Sequence[Array], scene: Callable[[], Scene]
 ) -> OurVerdict:
     """Predict the least multiple of forces [N] that contacts resist, and hold the forces."""
     setup, friction = analysis.setup, analysis.friction
@@ -203,21 +208,19 @@ def our_verdict(
     loads = analysis.as_they_are(rig.idle, named)
     margin = min((load.predicted_limit for load in loads), default=math.inf)
     held = [load.load for load in loads] or [rig.idle]
-    amiss = misplaced(rig.bench) if isinstance(rig.bench.scene.layout.holder, Slides) else ()
+    amiss = untouching(rig.bench) if isinstance(rig.bench.scene.layout.holder, Slides) else ()
     names = [load.name for load in loads] or ["no load"]
-    for name, trace in zip(names, rig.hold(held), strict=True):
+    for name, trace in zip(names, rig.traced(rig.holds(held)), strict=True):
         found = judge(trace, rig.bench.scene.layout, setup.hold, amiss)
         if found.outcome is not Outcome.HELD:
             return OurVerdict(True, False, margin, f"{name}: {found.outcome.value}: {found.reason}")
     return OurVerdict(True, True, margin, "")
 
 
-CHUNK = 10
+PUBLISHED_STEPS = 10
 """Simulation steps per sample: DexGraspBench moves its commands every ten steps."""
-FREE = 7
+POSE_END = 7
 """Coordinates of the object's free joint, which come first."""
-AT_REST = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
-"""Pose of the object where it is planned to be, from which displacement and turn count."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -229,7 +232,7 @@ class Timeline(Told):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Look:
+class Glance:
     """The object at a look, and how many fingers touch it."""
 
     pose: Array
@@ -241,9 +244,9 @@ def their_verdict(
     protocol: PublishedProtocol, scene: TestedScene, threads: int = 1
 ) -> tuple[RunVerdict, ...]:
     """Simulate all runs of a test and judge each."""
-    bench = Bench(scene, threads=threads, chunk=CHUNK, kept=("state",))
-    begun = np.concatenate([AT_REST, scene.opened if protocol.close_s else scene.shut])
-    root = FREE * bench.moves_as_told  # where one moves as told, its pose comes first
+    bench = Bench(scene, threads=threads, chunk=PUBLISHED_STEPS, kept=("state",))
+    begun = np.concatenate([IDENTITY_POSE, scene.opened if protocol.close_s else scene.shut])
+    root = POSE_END * bench.moves_as_told  # where one moves as told, its pose comes first
     runs = [
         replace(run, mocap=run.commands[:, :root] if root else None,
                 commands=run.commands[:, root:], joints=begun)
@@ -255,19 +258,19 @@ def their_verdict(
     )
 
 
-def looked(bench: Bench[TestedScene], motion: Motion, looks: Sequence[int]) -> list[Look]:
+def looked(bench: Bench[TestedScene], motion: Motion, looks: Sequence[int]) -> list[Glance]:
     """Look at the object after some samples of a motion."""
     (states,), fingers = motion.kept, bench.scene.fingers
     met = bench.touching([states[sample] for sample in looks])
     return [
-        Look(motion.joints[sample, :FREE], sum(not names.isdisjoint(own) for own in fingers))
+        Glance(motion.joints[sample, :POSE_END], sum(not names.isdisjoint(own) for own in fingers))
         for sample, names in zip(looks, met, strict=True)
     ]
 
 
-def timeline(protocol: PublishedProtocol, scene: TestedScene, run: Run) -> Timeline:
+def timeline(protocol: PublishedProtocol, scene: TestedScene, run: ProtocolRun) -> Timeline:
     """Lay out one run: closing, squeezing, then its steps."""
-    sample_s = CHUNK * scene.physics.timestep
+    sample_s = PUBLISHED_STEPS * scene.physics.timestep
     closing = _closing(protocol, scene, sample_s)
     counts = [samples(step.seconds, sample_s) for step in run]
     begins = np.cumsum([len(closing), *counts]).tolist()
@@ -295,7 +298,7 @@ def _closing(protocol: PublishedProtocol, scene: TestedScene, sample_s: float) -
     return np.vstack(parts)
 
 
-def _wrenches(run: Run, counts: list[int], scene: TestedScene, sample_s: float) -> Array:
+def _wrenches(run: ProtocolRun, counts: list[int], scene: TestedScene, sample_s: float) -> Array:
     """Return forces of the steps with what the palm's motion adds: (1), (n, 6)."""
     forces, paths, angles = list[Array](), [np.zeros((1, 3))], [np.zeros(1)]
     for part, count in zip(run, counts, strict=True):
@@ -319,18 +322,18 @@ def _acceleration(path: Array, sample_s: float) -> Array:
     return (speeds - before) / sample_s
 
 
-def judged_run(number: int, looks: Sequence[Look], fault: str, passing: Passing) -> RunVerdict:
+def judged_run(number: int, looks: Sequence[Glance], fault: str, passing: Passing) -> RunVerdict:
     """Judge one run at its looks, up to the first that does not pass."""
     moved, turned, seen, reason = 0.0, 0.0, list[int](), fault
     for look in looks:
         if reason:
             break
-        shift = float(np.linalg.norm(look.pose[:3] - AT_REST[:3]))
-        turn = float(np.degrees(rotation_angles(look.pose[None, 3:], AT_REST[None, 3:])[0]))
+        shift = float(np.linalg.norm(look.pose[:3]))
+        turn = float(np.degrees(rotation_angles(look.pose[None, 3:], IDENTITY_POSE[None, 3:])[0]))
         moved, turned = max(moved, shift), max(turned, turn)
         seen.append(look.fingers)
         if not shift < passing.most_m:
-            reason = f"the object moved by {1e3 * shift:.3g} mm, and {1e3 * passing.most_m:g}"
+            reason = f"the object moved by {MILLI * shift:.3g} mm, and {MILLI * passing.most_m:g}"
             reason += " is enough"
         elif not turn < passing.most_deg:
             reason = f"the object turned by {turn:.3g} deg, and {passing.most_deg:g} is enough"

@@ -18,14 +18,14 @@ from grasp_core.declared import Declared, declared
 from grasp_core.kinds import Number, OrInfinity, one_of
 from grasp_core.objects.polyhedron import Polyhedron
 from scenes.mujoco.chains import Weld
-from scenes.settings import PhysicsSettings
+from scenes.mujoco_options import PhysicsSettings
 
 Triple: TypeAlias = tuple[float, float, float]
 NOWHERE: Triple = (0.0, 0.0, 0.0)
 
 
 @declared
-class Source(Declared):
+class PublishedSource(Declared):
     """Files of a public repository in which a test is stated."""
 
     repository: str
@@ -54,7 +54,7 @@ class Step(Declared):
         return mass_kg * np.array(self.pull_m_s2)
 
 
-Run: TypeAlias = tuple[Step, ...]
+ProtocolRun: TypeAlias = tuple[Step, ...]
 
 
 @declared
@@ -77,13 +77,13 @@ class PublishedProtocol(Declared):
     name: str
     version: str
     """Which version of the test: branch or paper."""
-    sources: tuple[Source, ...]
+    sources: tuple[PublishedSource, ...]
     ours: tuple[str, ...]
     """What is not as published here although it could be, or is not stated there; sentences."""
     friction: float
     timestep_s: float
     """Length of a step of its own simulator [s]."""
-    runs: tuple[Run, ...]
+    runs: tuple[ProtocolRun, ...]
     passing: Passing
     mass_kg: float | None = None
     """Mass of every object [kg]; None where none is stated, and objects have water's density."""
@@ -136,7 +136,7 @@ def _scaled(way: Triple, size: float) -> Triple:
     return size * x, size * y, size * z
 
 
-def _pulls(acceleration: float, seconds: float, look_s: float) -> tuple[Run, ...]:
+def _pulls(acceleration: float, seconds: float, look_s: float) -> tuple[ProtocolRun, ...]:
     return tuple(
         (Step(seconds, pull_m_s2=_scaled(way, acceleration), look_s=look_s),) for way in SIX
     )
@@ -162,7 +162,7 @@ DEXGRASPBENCH = PublishedProtocol(
     name="dexgraspbench",
     version="branch main",
     sources=(
-        Source(
+        PublishedSource(
             "JYChen18/DexGraspBench", "1e7a5a6fce27cc92911080cbdc5ce9da56fddbf0",
             ("config/task/eval.yaml", "src/task/eval_func/fc_mocap.py",
              "src/task/eval_func/base.py", "src/util/hand_util.py", ALLEGRO_FILE),
@@ -186,11 +186,11 @@ DEXGRASPBENCH_PAPER = replace(
     name="dexgraspbench-paper",
     version="branch baseline, the benchmark of the BODex paper (arXiv 2412.16490)",
     sources=(
-        Source(
+        PublishedSource(
             "JYChen18/DexGraspBench", "9c961a4e54f1caf7d3821ccd22d142185f083607",
             ("config/task/eval.yaml", "src/task/eval_func/fc_mocap.py", ALLEGRO_FILE),
         ),
-        Source(
+        PublishedSource(
             "JYChen18/DexGraspBench", "1e7a5a6fce27cc92911080cbdc5ce9da56fddbf0", ("README.md",)
         ),
     ),
@@ -207,7 +207,7 @@ DEXONOMY = PublishedProtocol(
     name="dexonomy",
     version="branch main, tasks of the type force_closure, hard: False",
     sources=(
-        Source(
+        PublishedSource(
             "JYChen18/Dexonomy", "d561ff9df8545deef7a3f9e7cfb4045ef66f6913",
             ("dexonomy/config/op/eval.yaml", "dexonomy/config/base.yaml",
              "dexonomy/op/eval_data.py", "dexonomy/sim/mujoco_env.py",
@@ -233,7 +233,7 @@ MJ_GRASP_SIM = PublishedProtocol(
     name="mj-grasp-sim",
     version="branch main, grasp_stability_evaluation_from_joints with its defaults",
     sources=(
-        Source(
+        PublishedSource(
             "freiberg-roman/mj-grasp-sim", "efff5b32102d1675f64ce8a3984d46be56dff064",
             ("mgs/env/gravityless_object_grasping.py", "mgs/obj/ycb.py"),
         ),
@@ -272,7 +272,7 @@ MOLMOSPACES = PublishedProtocol(
     name="molmospaces",
     version="branch main, run_rigid.py with its defaults",
     sources=(
-        Source(
+        PublishedSource(
             "allenai/molmospaces", "1320b266d2b47aaa81c5f7a419cb9d3474e6994d",
             ("molmo_spaces/grasp_generation/main_scene.xml",
              "molmo_spaces/grasp_generation/run_rigid.py",

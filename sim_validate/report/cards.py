@@ -17,7 +17,7 @@ from scenes.drawing.clips import GraphicsError, write_trial_clip
 from scenes.drawing.pictures import Drawing
 from scenes.drawing.sheets import Sheet, svg_of
 from scenes.settings import FingerSettings
-from sim_validate.closure.replaying import Wanted, of_verdict, replayed
+from sim_validate.closure.replaying import WantedTrial, of_verdict, replayed
 from sim_validate.closure.verdict import Verdict, Verdicts
 from sim_validate.execution.execute import ExecutionJob, film, worth_seeing
 from sim_validate.execution.verdict import Executions
@@ -167,7 +167,7 @@ def _if_graphics(drawn: Drawn) -> Generator[None]:
 def _add_motion(drawn: Drawn, found: Findings, verdict: Verdict, clip: Path | None) -> None:
     run = found.run
     saved = replace(run.saved, friction=run.friction)
-    recorded = of_verdict(run.path / Verdicts.FILE, saved, verdict, Wanted(found.grasp.id))
+    recorded = of_verdict(run.path / Verdicts.FILE, saved, verdict, WantedTrial(found.grasp.id))
     trial = replayed(recorded)
     threshold = recorded.setup.hold.hold_threshold * trial.scene.layout.grasp_size_m
     drawn.motion = tuple(map(svg_of, motion_panels(trial, threshold)))

@@ -29,6 +29,7 @@ from grasp_core.closure.force_closure import force_closure
 from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.errors import InputError
 from grasp_core.kinds import Quantity, instance, value_of
+from grasp_core.messages import MICRO, MILLI
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.ferrari_canny import ferrari_canny
 from grasp_core.quality.wrench_limits import wrench_limits
@@ -78,7 +79,6 @@ LABEL = 18.0
 """Distance from the circle of the least value within which a label gives way [pixels]."""
 MAP_ROWS = 60
 """Height of the image of a map [its own pixels]; the map is twice as wide."""
-MILLI = 1e3
 USUAL_PUSH_N = FingerSettings().max_normal_force_n
 DIRECTION_DECIMALS = 12
 """Number of decimals to which two directions must agree to count as equal."""
@@ -364,7 +364,6 @@ SLIP_NAME = (1.0, "slips")
 """Share of its friction that a finger uses when it slips, and its name."""
 MOST_SHARE = 1.15
 """Upper end of an axis, relative to the limit on it."""
-MICRO = 1e6
 LEAST_UM = 1e-4
 """Displacement at which the chart's logarithmic axis begins [um]."""
 LEAST_PUSH = 1e-3

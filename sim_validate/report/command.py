@@ -16,6 +16,7 @@ from grasp_core.errors import InputError
 from grasp_core.files.file_kinds import GRASPS, MANIFEST
 from grasp_core.files.records import record_of
 from grasp_core.files.text_files import write_text
+from grasp_core.messages import MICRO
 from grasp_core.planning.result import Plan
 from grasp_core.provenance import versions
 from grasp_core.records.grasps_json import load_grasps
@@ -25,7 +26,7 @@ from scenes.drawing.pages import turntable_page
 from scenes.drawing.pictures import Drawing
 from scenes.mujoco.closure_scene import Scene, build_scene, write_scene
 from scenes.settings import FingerSettings
-from sim_validate.closure.replaying import Recorded, Replayed, Wanted, recorded_in, replayed
+from sim_validate.closure.replaying import Recorded, Replayed, WantedTrial, recorded_in, replayed
 from sim_validate.commands import flags
 from sim_validate.commands.console import Reporter
 from sim_validate.commands.exit_codes import Exit
@@ -155,7 +156,6 @@ def shown_report(asked: flags.ReportFlags, reporter: Reporter) -> Report:
 
 SHOWN_ROWS = 12
 """Number of rows of the motion that are shown; the trace file has all of them."""
-MICRO = 1e6
 
 
 def replay_trial(command: flags.ReplayFlags, reporter: Reporter) -> int:
@@ -167,7 +167,9 @@ def replay_trial(command: flags.ReplayFlags, reporter: Reporter) -> int:
         )
     source = command.source
     read = recorded_in_dataset if (source / MANIFEST).is_file() else recorded_in
-    recorded = read(source, Wanted(command.grasp, command.control, command.trial, command.grasps))
+    recorded = read(
+        source, WantedTrial(command.grasp, command.control, command.trial, command.grasps)
+    )
     found = replayed(recorded, command.wrench)
     said = recorded.outcome_of(found.name)
     _show(recorded, found, said, reporter)

@@ -18,6 +18,7 @@ from grasp_core.files.file_kinds import GRASPS
 from grasp_core.files.records import record_of
 from grasp_core.files.text_files import write_text
 from grasp_core.kinds import Count, Number, function, path_of, value_of
+from grasp_core.messages import MILLI
 from grasp_core.provenance import versions
 from grasp_core.values import Grasp
 from scenes.drawing.pages import (
@@ -59,7 +60,7 @@ from sim_validate.report.run_folder import (
 from sim_validate.report.sections import TemplateData
 
 ASSETS = Path(__file__).parent / "assets"
-MILLI, PERCENT = 1e3, 100.0
+PERCENT = 100.0
 FAMILY_MEANINGS = {
     "concurrent": "the lines of force meet in one point",
     "pencil": "two pairs of lines, which meet in points of a common line",

@@ -11,6 +11,7 @@ import numpy as np
 from grasp_core.by_value import counted
 from grasp_core.figures import NONE, Figure, figures
 from grasp_core.files.records import record_of
+from grasp_core.messages import MILLI
 from grasp_core.names import HANDS
 from scenes.drawing.pages import Fact, number
 from sim_validate.commands.config_file import flags_from
@@ -50,7 +51,6 @@ EXECUTION_FIGURES: Sequence[Figure] = figures(ExecutedGrasp)[1:]
 FINGERS_MEANING = "that touch at the grasp's contacts, by finger of the grasp"
 HAND_TITLE_FIGURES = ("grasp", "id")
 """Figures that the page has in its title."""
-MILLI = 1e3
 ALWAYS = ("mass_kg", "seed")
 """Settings of executions whose usual value depends on the object or on the plan."""
 

@@ -17,9 +17,9 @@ import numpy as np
 
 import grasp_core as gc
 import scenes
-from sim_validate.engine.limits_and_friction import released_friction
 from sim_validate.engine.setup import Setup
-from sim_validate.engine.simulate import Bench
+from sim_validate.engine.simulated_friction import released_friction
+from sim_validate.engine.stepping import Bench
 from sim_validate.processes.workers import available_cores, each
 from tests.benchmarks.objects import FAMILIES
 

@@ -22,17 +22,14 @@ import grasp_core as gc
 import scenes
 from grasp_core.closure.contacts import contact_frictions, contact_torsions
 from grasp_core.quality.wrench_limits import WrenchBody, limit_of
-from scenes.settings import PhysicsSettings
+from scenes.mujoco_options import PhysicsSettings
 from sim_validate.closure.controls import negative_controls, try_control
-from sim_validate.engine.limits_and_friction import (
-    bisected_limits,
-    part,
-    ramped_limits,
-    released_friction,
-    squeezed,
-)
+from sim_validate.engine.rig import squeezed
+from sim_validate.engine.schedules import TrialLoad, part
 from sim_validate.engine.setup import Agenda, Setup
-from sim_validate.engine.simulate import Bench, Load
+from sim_validate.engine.simulated_friction import released_friction
+from sim_validate.engine.simulated_limits import bisected_limits, ramped_limits
+from sim_validate.engine.stepping import Bench
 from sim_validate.engine.traces import Outcome, judge
 from sim_validate.processes.workers import available_cores, each
 from tests.benchmarks.objects import FAMILIES
@@ -106,7 +103,7 @@ def limiting_loads(case, setup, count, seed):
     scale = np.array([1.0] * 3 + [body.radius] * 3)
     drawn = np.random.default_rng(seed).normal(size=(count, 6)) * scale
     limits = [limit_of(resisted, wrench) for wrench in drawn]
-    return [Load(limit.limit * limit.wrench, limit.forces) for limit in limits]
+    return [TrialLoad(limit.limit * limit.wrench, limit.forces) for limit in limits]
 
 
 def examine(case):
@@ -119,7 +116,7 @@ def examine(case):
     limits = limiting_loads(case, setup, DIRECTIONS, case.place)
     near = limits[:HELD_DIRECTIONS]
     tried = [part(rig.idle, limit, share) for share in (INSIDE, OUTSIDE) for limit in near]
-    ends = [judge(trace, layout, setup.hold).outcome for trace in rig.hold(tried)]
+    ends = [judge(trace, layout, setup.hold).outcome for trace in rig.traced(rig.holds(tried))]
     critical = gc.critical_friction(case.grasp, torsion_m=setup.physics.torsion_m)
     known = replace(case.grasp, critical_friction=critical)
     verdicts = [

@@ -16,7 +16,9 @@ import grasp_core as gc
 import scenes
 import sim_validate as sv
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
-from sim_validate.engine.limits_and_friction import Analysis, closed_on, ramped_limits
+from sim_validate.engine.planned_loads import LoadPlanner
+from sim_validate.engine.rig import closed_on
+from sim_validate.engine.simulated_limits import ramped_limits
 
 FRICTION, RADIUS_M, APPROACH_M = 0.5, 0.035, 0.03
 LOOSE, HOPEFUL = 0.98, 1.01
@@ -70,7 +72,7 @@ def carried(hand, body, found, way, setup):
     scene = scenes.build_hand_scene(hand, body, found, FRICTION, down=tuple(way))
     rig = closed_on(scene, setup, scene.layout.friction)
     weight = [("weight", np.append(GRAVITY_M_PER_S2 * way, np.zeros(3)))]
-    analysis = Analysis(body, found.contacts, FRICTION, setup, scene.hand.motors)
+    analysis = LoadPlanner(body, found.contacts, FRICTION, setup, scene.hand.motors)
     (load,) = analysis.as_they_are(rig.idle, weight)
     (at,) = ramped_limits(rig, [load.limit])
     assert at is not None

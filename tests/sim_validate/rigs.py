@@ -11,9 +11,10 @@ import scenes
 from grasp_core.closure.contacts import contact_frictions
 from grasp_core.planning.given_contacts import Seated, grasp_of
 from grasp_core.quality.wrench_limits import WrenchBody, limit_of
-from sim_validate.engine.limits_and_friction import squeezed
+from sim_validate.engine.rig import squeezed
+from sim_validate.engine.schedules import TrialLoad
 from sim_validate.engine.setup import Setup
-from sim_validate.engine.simulate import Bench, Load
+from sim_validate.engine.stepping import Bench
 
 MAX_FORCE = 10.0
 
@@ -78,7 +79,7 @@ def limiting_loads(body, grasp, friction, count, seed=0):
     scale = np.array([1.0] * 3 + [body.radius] * 3)
     drawn = np.random.default_rng(seed).normal(size=(count, 6)) * scale
     found = [limit_of(resisted, wrench) for wrench in drawn]
-    return [Load(limit.limit * limit.wrench, limit.forces) for limit in found]
+    return [TrialLoad(limit.limit * limit.wrench, limit.forces) for limit in found]
 
 
 def imbalance(load, body, grasp):

@@ -4,8 +4,8 @@ import pytest
 
 import grasp_core as gc
 import scenes
-from scenes.mujoco.closure_scene import PAD_TOUCH, SQUEEZE
-from scenes.mujoco.scene_text import TOUCH
+from scenes.mujoco.closure_scene import GENTLE_SQUEEZE, PAD_TOUCH
+from scenes.mujoco.scene_text import TOUCH_DEPTH
 from tests.scenes.mujoco.compiled import compiled, state_of
 
 OBJECTS = ("wedge", "screwdriver")
@@ -84,7 +84,7 @@ def test_all_fingertips_touch_from_the_first_step(name, scale):
     scene = scenes.build_scene(body, gc.plan(body, 0.5, limit=1).grasps[0], 0.5)
     _, data = compiled(scene, "grasp")
     assert data.ncon == 4
-    depth, off = TOUCH * body.radius, SINGLE * body.radius
+    depth, off = TOUCH_DEPTH * body.radius, SINGLE * body.radius
     assert off < 0.5 * depth
     assert all(c.dist == pytest.approx(-depth, abs=off) for c in data.contact)
 
@@ -117,7 +117,7 @@ def test_fingers_push_as_hard_as_their_keyframe_says(held):
     assert {model.key(i).name for i in range(model.nkey)} == {
         "pregrasp", "approach", "grasp", "squeeze",
     }  # fmt: skip
-    for key, share in (("grasp", SQUEEZE), ("squeeze", 1.0)):
+    for key, share in (("grasp", GENTLE_SQUEEZE), ("squeeze", 1.0)):
         data, push = after(model, key, 1500)
         assert data.ncon == 4
         moved = np.linalg.norm(data.qpos[7:].reshape(4, 3), axis=1).max()
@@ -149,7 +149,7 @@ def test_each_fingertip_touches_the_face_of_its_contact(held):
     mujoco.mj_forward(model, data)
     met = list(touching(model, data))
     assert sorted(finger for finger, _ in met) == [0, 1, 2, 3]
-    depth = 1e-5 + TOUCH * body.radius
+    depth = 1e-5 + TOUCH_DEPTH * body.radius
     assert all(c.dist == pytest.approx(-depth, abs=SINGLE * body.radius) for c in data.contact)
     for finger, normal in met:
         assert grasp.contacts[finger].normal @ normal == pytest.approx(1.0, abs=1e-9)

@@ -11,7 +11,7 @@ import grasp_core as gc
 import scenes
 from grasp_core.forces.contact_forces import even_forces
 from scenes.mujoco.held_scene import gravity_of, held_physics
-from scenes.mujoco.scene_text import FINGERTIPS, TABLE
+from scenes.mujoco.scene_text import FINGERTIP_BIT, TABLE_BIT
 from tests.scenes.mujoco.compiled import compiled, state_of
 
 OBJECTS = ("dodecahedron", "l-bracket")
@@ -63,7 +63,7 @@ def test_what_touches_what(built):
                 kinds = (model.geom(one).name, model.geom(other).name)
                 pairs.add(tuple(sorted(kind.rstrip("0123456789") for kind in kinds)))
     assert pairs == {("finger", met), ("object", "table")}
-    assert FINGERTIPS & TABLE == 0
+    assert FINGERTIP_BIT & TABLE_BIT == 0
     for finger, friction in enumerate(grip.friction):
         assert model.geom(f"finger{finger}").friction[0] == friction
     assert model.geom("object").friction[0] == 0.0

@@ -9,7 +9,8 @@ import pytest
 import grasp_core as gc
 from scenes.mujoco.chains import Weld
 from scenes.mujoco.published_tests import HandServos, TestedObject
-from scenes.settings import FingerSettings, PhysicsSettings
+from scenes.mujoco_options import PhysicsSettings
+from scenes.settings import FingerSettings
 from sim_validate.hands.dexgraspbench import hand_file
 from sim_validate.protocols.published import protocol
 from tests.grasp_core.hands.gripping import FRICTION, reaches, scaled

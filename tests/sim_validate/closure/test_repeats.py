@@ -9,9 +9,10 @@ from scipy.spatial.transform import Rotation
 
 import sim_validate as sv
 from grasp_core.objects.on_faces import face_under
-from sim_validate.closure.validate import disturbed, noisy_trial
+from sim_validate.closure.validate import noisy_trial
 from sim_validate.closure.verdict import interval
-from sim_validate.engine.limits_and_friction import squeezed
+from sim_validate.engine.misplacement import disturbed
+from sim_validate.engine.rig import squeezed
 from sim_validate.engine.setup import Agenda, NamedWrench, Setup
 from sim_validate.engine.traces import Outcome
 from sim_validate.settings import Noise

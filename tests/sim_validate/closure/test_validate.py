@@ -1,6 +1,5 @@
 import json
 import math
-import pickle
 import re
 from dataclasses import replace
 
@@ -11,13 +10,13 @@ import grasp_core as gc
 import scenes
 import sim_validate as sv
 from scenes.settings import FingerSettings
+from sim_validate.closure import validate as validating
 from sim_validate.closure.controls import negative_controls
-from sim_validate.closure.validate import Job
 from sim_validate.closure.verdict import Verdicts, trace_arrays
 from sim_validate.commands.exit_codes import Exit
-from sim_validate.engine import gate as gate_module
-from sim_validate.engine.gate import measured_gate
-from sim_validate.engine.limits_and_friction import Rig
+from sim_validate.engine.gate import ClosureCase
+from sim_validate.engine.known_cases import measured
+from sim_validate.engine.rig import Rig
 from sim_validate.engine.setup import Agenda, NamedWrench, Setup
 from sim_validate.engine.traces import Outcome
 from tests.sim_validate.rigs import grasps, plan_with_a_bad_grasp
@@ -207,19 +206,20 @@ def test_contacts_rounded_to_six_digits_are_as_good():
     assert verdict.scene.layout.drive.radius_m > 0.01 * body.radius
 
 
-def test_a_worker_takes_over_how_the_simulator_did(monkeypatch):
-    body, (grasp, *_) = grasps("wedge", 0.5, 1)
+def test_workers_take_over_how_the_simulator_did(monkeypatch):
+    monkeypatch.setattr("sim_validate.processes.workers.UNITS_PER_PROCESS", 1)
+    body, found = grasps("wedge", 0.5, 2)
     asked = replace(WITHOUT_CONTROLS, critical_friction=False)
-    job = Job(body, 0.5, asked, Setup()).prepared(1, 1)
-    assert job.gate is measured_gate(Setup(), 0.5, body.radius)
-    arrived = pickle.loads(pickle.dumps(job))  # noqa: S301
+    gate = measured(ClosureCase.of(Setup(), 0.5, body.radius))
+    assert sv.validate(body, found[0], 0.5, agenda=asked).gate is gate
 
     def fail(_):
         raise AssertionError("measured again")
 
-    monkeypatch.setattr(gate_module, "measured", fail)
-    assert arrived(grasp).held
-    assert arrived(grasp).gate == job.gate
+    monkeypatch.setattr(ClosureCase, "checks", fail)
+    for verdict in sv.validate_all(body, found, 0.5, agenda=asked, jobs=2):
+        assert verdict.held
+        assert verdict.gate == gate
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
@@ -238,20 +238,20 @@ def test_a_fingertip_that_meets_nothing_is_the_outcome_of_its_grasp_alone(jobs, 
 def test_any_error_about_one_grasp_is_its_outcome(monkeypatch):
     body, (grasp, *_) = grasps("wedge", 0.5, 1)
     elsewhere = replace(grasp, id="elsewhere", faces=(*grasp.faces[1:], grasp.faces[0]))
-    odd, faithful = replace(grasp, id="odd"), Job.__call__
+    odd, faithful = replace(grasp, id="odd"), validating.tested
 
-    def failing(job, given):
+    def failing(body, given, *others):
         if given.id == "odd":
             raise np.linalg.LinAlgError("SVD did not converge")
-        return faithful(job, given)
+        return faithful(body, given, *others)
 
-    monkeypatch.setattr(Job, "__call__", failing)
+    monkeypatch.setattr(validating, "tested", failing)
     found = sv.validate_all(body, [elsewhere, odd, grasp], 0.5, agenda=WITHOUT_CONTROLS)
     assert [each.outcome for each in found] == [Outcome.ERROR, Outcome.ERROR, Outcome.HELD]
     assert "does not lie on face" in found[0].failures[0].hold.reason
-    kept = Verdicts.of(body, 0.5, measured_gate(Setup()), found).text()
+    kept = Verdicts.of(body, 0.5, measured(ClosureCase.of(Setup())), found).text()
     assert Verdicts.of_text(kept).verdicts[1].outcome is Outcome.ERROR
-    monkeypatch.setattr(Job, "__call__", lambda *_: (_ for _ in ()).throw(MemoryError))
+    monkeypatch.setattr(validating, "tested", lambda *_: (_ for _ in ()).throw(MemoryError))
     with pytest.raises(MemoryError):
         sv.validate_all(body, [grasp], 0.5)
 

@@ -11,10 +11,13 @@ import pytest
 
 import grasp_core as gc
 from sim_validate.closure.controls import control_case, negative_controls
-from sim_validate.engine.limits_and_friction import Analysis, forces_just_above, part, squeezed
+from sim_validate.engine.planned_loads import LoadPlanner
+from sim_validate.engine.rig import squeezed
+from sim_validate.engine.schedules import Thresholds, part
 from sim_validate.engine.setup import Agenda, Setup
-from sim_validate.engine.simulate import Bench
-from sim_validate.engine.traces import USABLE, WATCHED, EarlyEnds, Thresholds, judge
+from sim_validate.engine.simulated_friction import forces_just_above
+from sim_validate.engine.stepping import Bench
+from sim_validate.engine.traces import LEAST_WATCHED_SAMPLES, USABLE, EarlyEnds, judge
 from sim_validate.settings import HoldProtocol
 from tests.marks import more
 from tests.sim_validate.engine.test_traces import pose
@@ -41,7 +44,7 @@ def of_holds(body, grasp, friction):
     setup = Setup()
     scene = setup.scene(body, grasp, friction)
     rig = squeezed(Bench(scene), setup, scene.layout.squeeze_forces, friction)
-    planned = Analysis(body, grasp.contacts, friction, setup, None).planned(rig.idle, Agenda())
+    planned = LoadPlanner(body, grasp.contacts, friction, setup, None).planned(rig.idle, Agenda())
     loads = [part(rig.idle, each.limit, share) for each in planned for share in SHARES]
     return judged(rig, loads)
 
@@ -56,10 +59,8 @@ def of_controls(body, grasp, friction):
 
 def judged(rig, loads, settling=None):
     layout, protocol = rig.bench.scene.layout, rig.setup.hold
-    pairs = zip(
-        replace(rig, whole=True).hold(loads, settling), rig.hold(loads, settling), strict=True
-    )
-    for traces in pairs:
+    trials = rig.holds(loads, settling)
+    for traces in zip(replace(rig, whole=True).traced(trials), rig.traced(trials), strict=True):
         whole, early = (judge(trace, layout, protocol) for trace in traces)
         yield whole.outcome, early.outcome, *(len(trace.times_s) for trace in traces)
 
@@ -78,7 +79,9 @@ def of_releases(body, grasp):
     rig = squeezed(bench, setup, forces, least, high)
     limit = min(protocol.threshold, 2e-3 * least) * bench.scene.layout.grasp_size_m
     frictions = [near * least for near in NEAR]
-    whole, early = rig.release(high, frictions), rig.at_rest(high).release(high, frictions, limit)
+    resting = rig.at_rest(high)
+    whole = rig.traced(rig.releases(high, frictions))
+    early = resting.traced(resting.releases(high, frictions, limit))
     for traces in zip(whole, early, strict=True):
         yield *(trace.stayed(limit) for trace in traces), *(len(each.times_s) for each in traces)
 
@@ -123,8 +126,9 @@ def test_held_objects_move_no_farther_than_the_bound_to_the_end(held):
     loads = [part(rig.idle, limit, share) for limit in limits for share in (0.3, 0.8, 0.95)]
     limit = HoldProtocol().hold_threshold * rig.bench.scene.layout.grasp_size_m
     ended = 0
-    wholes = replace(rig, whole=True).hold(loads)
-    for whole, early in zip(wholes, rig.hold(loads), strict=True):
+    trials = rig.holds(loads)
+    wholes = replace(rig, whole=True).traced(trials)
+    for whole, early in zip(wholes, rig.traced(trials), strict=True):
         assert len(whole.times_s) == 40
         if len(early.times_s) < 40:
             assert whole.start_m + whole.displacements_m.max() < USABLE * limit
@@ -176,7 +180,7 @@ def test_a_trial_ends_once_it_was_watched_where_nothing_can_change_the_answer(
     change(joints, speeds, looking)
     samples = range(LAST_OF_SETTLING, LAST_OF_SETTLING + 6)
     said = [look(looking, sample, joints, speeds)[1] for sample in samples]
-    assert said == [False] * WATCHED + [ended] * (6 - WATCHED)
+    assert said == [False] * LEAST_WATCHED_SAMPLES + [ended] * (6 - LEAST_WATCHED_SAMPLES)
 
 
 def test_a_change_of_speed_keeps_a_trial_going(looking):

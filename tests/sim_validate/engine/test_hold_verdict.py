@@ -3,7 +3,7 @@ import re
 import numpy as np
 import pytest
 
-from sim_validate.engine.simulate import Health
+from sim_validate.engine.stepping import Health
 from sim_validate.engine.traces import Outcome, Trace, judge
 from sim_validate.settings import HoldProtocol
 

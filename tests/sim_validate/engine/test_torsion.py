@@ -4,8 +4,9 @@ import pytest
 
 import grasp_core as gc
 import sim_validate as sv
-from scenes.settings import PhysicsSettings
-from sim_validate.engine.gate import measured_gate, require_faithful
+from scenes.mujoco_options import PhysicsSettings
+from sim_validate.engine.gate import ClosureCase
+from sim_validate.engine.known_cases import checked, measured
 from sim_validate.engine.setup import Agenda, Setup
 from tests.sim_validate.rigs import grasps
 
@@ -25,7 +26,7 @@ RESISTED = 1e-3
 def test_the_gate_twists_a_box_and_predictions_with_torsion_are_what_simulation_finds():
     body, found = grasps("wedge", FRICTION, 1, FREE, "tilted")
     setup = Setup(physics=PhysicsSettings(torsion_m=SHARE * body.radius))
-    twists = [check for check in require_faithful(setup, FRICTION, body.radius).checks
+    twists = [check for check in checked(ClosureCase.of(setup, FRICTION, body.radius)).checks
               if "twist at which" in check.name]  # fmt: skip
     assert len(twists) == 2
     (grasp,) = found
@@ -47,7 +48,8 @@ def test_the_gate_twists_a_box_and_predictions_with_torsion_are_what_simulation_
 @pytest.mark.slow
 def test_the_gate_refuses_settings_that_turn_too_early():
     physics = PhysicsSettings(torsion_m=7e-4, impratio=10.0)
-    failed = [c.name for c in measured_gate(Setup(physics=physics)).checks if not c.passed]
+    checks = measured(ClosureCase.of(Setup(physics=physics))).checks
+    failed = [check.name for check in checks if not check.passed]
     assert any("twist at which" in name for name in failed)
 
 

@@ -11,7 +11,7 @@ import grasp_core as gc
 import scenes
 import sim_validate as sv
 from grasp_core.errors import UnfaithfulError
-from scenes.mujoco.fingertips import fitting_radius
+from scenes.mujoco.fingertip_room import fitting_radius
 from sim_validate import run
 from sim_validate.commands.exit_codes import Exit
 from sim_validate.execution import execute as jobs

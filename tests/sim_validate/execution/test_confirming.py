@@ -8,7 +8,7 @@ import pytest
 import grasp_core as gc
 import scenes
 import sim_validate as sv
-from sim_validate.engine.simulate import Health
+from sim_validate.engine.stepping import Health
 from sim_validate.execution import execute
 from sim_validate.execution.execute import (
     FINE_S,

@@ -12,7 +12,7 @@ from scenes.example_objects import example_object
 from sim_validate.execution.execute import ExecutionJob, Fingertips, executed
 from sim_validate.execution.trials import Skipped
 from sim_validate.execution.verdict import edges_in_words
-from sim_validate.settings import KINDS
+from sim_validate.settings import TRIAL_KINDS
 from tests.grasp_core.execution.held import box
 from tests.scenes.meshes import dented_ball
 from tests.sim_validate.execution.held_rigs import G, opposed, planned
@@ -30,7 +30,7 @@ def light():
 
 def test_a_light_object_survives_every_trial(light):
     assert light.survived
-    assert {trial.kind for trial in light.trials} == set(KINDS)
+    assert {trial.kind for trial in light.trials} == set(TRIAL_KINDS)
     assert all(trial.fate == "stuck" for trial in light.trials)
     assert not light.skipped
     assert light.mass_kg == 0.1

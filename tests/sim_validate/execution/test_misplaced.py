@@ -7,11 +7,12 @@ from scipy.spatial.transform import Rotation
 
 import grasp_core as gc
 from grasp_core.execution.grips import unsqueezed
-from scenes.mujoco.fingertips import fitting_radius
+from scenes.mujoco.fingertip_room import fitting_radius
 from scenes.mujoco.held_scene import held_layout
-from scenes.mujoco.scene_text import TOUCH
+from scenes.mujoco.scene_text import TOUCH_DEPTH
 from scenes.settings import HeldSettings
-from sim_validate.execution.trials import ROOM, closed_there, errors, met, misplacements
+from sim_validate.engine.misplacement import drawn_errors
+from sim_validate.execution.trials import ROOM_TO_COME, closed_there, misplaced_poses, tips_met
 from tests.sim_validate.execution.held_rigs import planned
 
 OFF_M, OFF_RAD = 0.002, np.radians(3.0)
@@ -40,7 +41,7 @@ def distances(layout, points):
 
 def tip_paths(layout, pose, reached, count=200):
     """Centres of the fingertips on their ways to where they stop, in the object's frame."""
-    room = ROOM * (OFF_M + OFF_RAD * layout.radius_m)
+    room = ROOM_TO_COME * (OFF_M + OFF_RAD * layout.radius_m)
     stop = layout.tip_centers + np.einsum("kij,kj->ki", layout.axes, reached)
     start = layout.tip_centers - room * layout.frames[:, :, 0]
     way = start + np.linspace(0.0, 1.0, count)[:, None, None] * (stop - start)
@@ -48,15 +49,15 @@ def tip_paths(layout, pose, reached, count=200):
 
 
 def drawn(layout, count, seed):
-    off = errors(count, seed, "exactly")
-    return misplacements(layout, OFF_M * off[:, 0], OFF_RAD * off[:, 1])
+    off = drawn_errors(count, seed, "exactly")
+    return misplaced_poses(layout, OFF_M * off[:, 0], OFF_RAD * off[:, 1])
 
 
 @pytest.fixture(scope="module", params=["box", "l-bracket"])
 def misplaced(request):
     layout = layout_of(request.param)
     poses = drawn(layout, 12, 0)
-    return layout, poses, met(layout, poses, OFF_M, OFF_RAD)
+    return layout, poses, tips_met(layout, poses, OFF_M, OFF_RAD)
 
 
 def test_objects_are_off_by_what_is_stated():
@@ -74,7 +75,7 @@ def test_objects_are_off_by_what_is_stated():
 def test_fingertips_touch_where_they_stop_and_nowhere_before(misplaced):
     """The judge is trimesh: its distance from the mesh along the whole way, densely."""
     layout, poses, reached = misplaced
-    radii = layout.tip_radius_m - TOUCH * layout.radius_m
+    radii = layout.tip_radius_m - TOUCH_DEPTH * layout.radius_m
     touched = 0
     for pose, own in zip(poses, reached, strict=True):
         ways = tip_paths(layout, pose, own)
@@ -89,18 +90,18 @@ def test_fingertips_touch_where_they_stop_and_nowhere_before(misplaced):
 def test_a_finger_that_meets_nothing_stops_beyond_its_place():
     layout = layout_of("box")
     off = np.array([[10.0 * layout.radius_m, 0.0, 0.0]])
-    (pose,) = misplacements(layout, off, np.zeros((1, 3)))
-    reached = met(layout, (pose,), OFF_M, 0.0)
+    (pose,) = misplaced_poses(layout, off, np.zeros((1, 3)))
+    reached = tips_met(layout, (pose,), OFF_M, 0.0)
     moved = np.einsum("kij,pkj->pki", layout.axes, reached)[0]
-    assert moved == pytest.approx(ROOM * OFF_M * layout.frames[:, :, 0], abs=1e-12)
+    assert moved == pytest.approx(ROOM_TO_COME * OFF_M * layout.frames[:, :, 0], abs=1e-12)
     assert closed_there(layout, pose, reached[0]) is False
 
 
 def test_errors_have_the_stated_deviations():
-    off = errors(2000, 1, "deviation")
+    off = drawn_errors(2000, 1, "deviation")
     assert off.std(axis=0) == pytest.approx(1.0, abs=0.06)
     layout = layout_of("box")
-    poses = misplacements(layout, OFF_M * off[:20, 0], OFF_RAD * off[:20, 1])
+    poses = misplaced_poses(layout, OFF_M * off[:20, 0], OFF_RAD * off[:20, 1])
     for pose, (way, turn) in zip(poses, off, strict=False):
         assert pose.moved == pytest.approx(OFF_M * way, abs=1e-9)
         exact = Rotation.from_rotvec(OFF_RAD * turn).as_matrix()

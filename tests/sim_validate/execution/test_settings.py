@@ -18,7 +18,7 @@ from sim_validate.commands.config_file import flags_from
 from sim_validate.commands.simulation_flags import ExecuteFlags
 from sim_validate.execution.paths import stop
 from sim_validate.hands.trials import hand_execution_settings
-from sim_validate.settings import KINDS, TrialKind
+from sim_validate.settings import TRIAL_KINDS, TrialKind
 
 TABLE = {
     "density_kg_m3": 700, "trials": ["lift", "weight"], "tip_radius_m": 0.004, "down": [1, 0, 0],
@@ -42,7 +42,7 @@ def test_a_table_says_how_objects_are_executed():
 def test_trials_are_put_in_order_and_counted_once():
     chosen = sv.ExecutionSettings(0.1, trials=["knock", "lift", "knock"])
     assert chosen.trials == ("lift", "knock")
-    assert sv.ExecutionSettings(0.1).trials == KINDS == get_args(TrialKind)
+    assert sv.ExecutionSettings(0.1).trials == TRIAL_KINDS == get_args(TrialKind)
 
 
 def test_the_duration_of_a_stop_is_limited():

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from scenes.mujoco.held_scene import hinged
 from scenes.mujoco.mjcf_text import rotations
-from sim_validate.engine.simulate import Health
+from sim_validate.engine.stepping import Health
 from sim_validate.execution.paths import Table, idle
 from sim_validate.execution.simulate import (
     SLID,

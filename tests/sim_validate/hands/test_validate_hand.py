@@ -8,7 +8,7 @@ import pytest
 import grasp_core as gc
 import sim_validate as sv
 from grasp_core.errors import InputError, UnfaithfulError
-from scenes.settings import PhysicsSettings
+from scenes.mujoco_options import PhysicsSettings
 from sim_validate.closure.verdict import AGREEMENT
 from sim_validate.hands.trials import KnownHand, hand_setup
 from tests.grasp_core.hands.gripping import FRICTION, reaches, scaled

@@ -8,7 +8,7 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.values import Contact
-from sim_validate.protocols.judging import Look, judge_by, judge_hand_by, judged_run
+from sim_validate.protocols.judging import Glance, judge_by, judge_hand_by, judged_run
 from sim_validate.protocols.published import Passing, protocol, protocol_names
 from tests.grasp_core.hands.gripping import FRICTION, reaches, scaled
 
@@ -79,7 +79,7 @@ def moving(heights, turn_deg=0.0):
     half = math.radians(0.5 * turn_deg)
     poses = np.tile([0.0, 0.0, 0.0, math.cos(half), 0.0, math.sin(half), 0.0], (len(heights), 1))
     poses[:, 2] = heights
-    return [Look(pose, 2) for pose in poses[2:]]
+    return [Glance(pose, 2) for pose in poses[2:]]
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ from sim_validate.hands.dexgraspbench import (
     reach_of_record,
     recorded_postures,
 )
-from sim_validate.protocols.judging import CHUNK, judge_hand_by, their_verdict, timeline
+from sim_validate.protocols.judging import PUBLISHED_STEPS, judge_hand_by, their_verdict, timeline
 from sim_validate.protocols.published import protocol
 from tests.grasp_core.hands.gripping import FRICTION, reaches, scaled
 from tests.scenes.mujoco.compiled import compiled
@@ -131,7 +131,7 @@ def test_a_run_is_what_a_plain_loop_of_steps_gives():
     for sample, (told, wrench) in enumerate(zip(run.commands, run.wrenches, strict=True)):
         data.mocap_pos[0], data.mocap_quat[0], data.ctrl[:] = told[:3], told[3:FREE], told[FREE:]
         data.xfrc_applied[model.body("object").id] = wrench
-        mujoco.mj_step(model, data, nstep=CHUNK)
+        mujoco.mj_step(model, data, nstep=PUBLISHED_STEPS)
         if sample in run.looks:
             farthest = max(farthest, float(np.linalg.norm(data.qpos[:3])))
     assert their_verdict(TEST, made)[2].displacement_m == pytest.approx(farthest, abs=1e-9)

@@ -8,7 +8,7 @@ import pytest
 import grasp_core as gc
 from scenes.mujoco.published_tests import TestedObject
 from scenes.settings import FingerSettings
-from sim_validate.protocols.judging import CHUNK, timeline
+from sim_validate.protocols.judging import PUBLISHED_STEPS, timeline
 from sim_validate.protocols.published import Step, protocol
 from tests.grasp_core.hands.gripping import scaled
 
@@ -16,7 +16,7 @@ BODY = scaled("dodecahedron", 0.05)
 GRASP = gc.plan(BODY, 0.5, limit=1).grasps[0]
 TEST = protocol("dexgraspbench")
 SCENE = TestedObject(BODY, 0.6, 0.1, TEST.physics).by_fingertips(GRASP, FingerSettings())
-SAMPLE = CHUNK * 0.004
+SAMPLE = PUBLISHED_STEPS * 0.004
 
 
 def laid(*steps):

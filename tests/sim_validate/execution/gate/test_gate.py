@@ -10,8 +10,8 @@ import scenes
 import sim_validate as sv
 from scenes.mujoco.held_scene import gravity_of
 from scenes.settings import HeldSettings
-from sim_validate.engine.gate import measured
-from sim_validate.execution.gate import HeldCase, cases_of, require_faithful_execution
+from sim_validate.engine.known_cases import measured
+from sim_validate.execution.gate import HeldCase, cases_of
 
 USUAL, STIFF, SOFT = (0.3, 2000.0, 0.07), (0.05, 10_000.0, 0.02), (2.0, 500.0, 0.2)
 """Mass of the object [kg], stiffness of the springs [N/m], radius of the object [m]."""
@@ -122,7 +122,7 @@ def test_no_grasp_is_executed_with_broken_settings():
     best = gc.best_squeeze(body, contacts, 0.5, gc.any_direction(0.2), max_push_n=10.0)
     layout = scenes.build_held_scene(body, best.grip, scenes.HeldSettings(mass_kg=0.2))
     physics = replace(layout.physics, cone="pyramidal")
-    with pytest.raises(gc.UnfaithfulError, match=r"no grasp is executed.*obliquely.*OUT OF TOL"):
+    with pytest.raises(gc.UnfaithfulError, match=r"nothing is simulated.*obliquely.*OUT OF TOL"):
         sv.execute(body, grasp, 0.5, settings, physics=physics)
     with pytest.raises(gc.InputError, match=r"physics\.gravity must be that of the settings"):
         sv.execute(body, grasp, 0.5, settings, physics=replace(physics, gravity=(0.0, 0.0, -9.0)))
@@ -139,7 +139,6 @@ def test_settings_are_measured_once_whatever_the_direction_of_gravity():
     nearly = replace(scene.layout, object_kg=1.001 * scene.layout.object_kg)
     (second,) = cases_of(nearly, turned, hand, 10.0)
     assert measured(first) is measured(second)
-    require_faithful_execution(scene.layout, scene.physics, HeldSettings(), 10.0)
 
 
 def test_each_friction_of_a_scene_is_measured():

@@ -8,9 +8,10 @@ import grasp_core as gc
 import scenes
 import sim_validate as sv
 from scenes.mujoco.closure_scene import build_scene
-from sim_validate.engine.limits_and_friction import Rig, forces_just_above, released_friction
+from sim_validate.engine.rig import Rig
 from sim_validate.engine.setup import Setup
-from sim_validate.engine.simulate import Bench
+from sim_validate.engine.simulated_friction import forces_just_above, released_friction
+from sim_validate.engine.stepping import Bench
 from sim_validate.settings import FrictionProtocol
 from tests.sim_validate.rigs import grasps
 
@@ -71,8 +72,8 @@ def test_a_simulator_with_another_friction_is_seen_through(monkeypatch, factor, 
     """Friction in the simulation is so many times what it should be: the critical one is less."""
     releases = Rig.releases
 
-    def with_other_friction(rig, high, frictions):
-        return releases(rig, high, [factor * friction for friction in frictions])
+    def with_other_friction(rig, high, frictions, *more):
+        return releases(rig, high, [factor * friction for friction in frictions], *more)
 
     body, (grasp, *_) = grasps("random-12-1", 0.5, 1, ("regulus",))
     sv.simulated_critical_friction(body, grasp)  # measures the gate, which is kept

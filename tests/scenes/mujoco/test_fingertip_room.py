@@ -6,9 +6,9 @@ import trimesh
 
 import grasp_core as gc
 import scenes
-from scenes.mujoco import fingertips
+from scenes.mujoco import fingertip_room
 from scenes.mujoco.closure_scene import arrange
-from scenes.mujoco.fingertips import clashes, fitting_radius
+from scenes.mujoco.fingertip_room import clashes, fitting_radius
 
 
 @pytest.mark.parametrize("name", ["l-bracket", "wedge"])
@@ -47,7 +47,7 @@ def test_a_fingertip_that_shrinks_too_often_is_shown_to_be_clear_nowhere(monkeyp
     inner, point, normal = _inner_corner(body)
     at, radius = (point + 0.05 * body.radius * inner)[None], 0.1 * body.radius
     assert fitting_radius(body, at, normal[None]) > 0.04 * body.radius
-    monkeypatch.setattr(fingertips, "MAX_SHRINKING", 1)
+    monkeypatch.setattr(fingertip_room, "MAX_SHRINKING", 1)
     assert fitting_radius(body, at, normal[None]) == pytest.approx(1e-3 * body.radius)
     assert "meets face" in clashes(body, at, normal[None], radius)[0]
 

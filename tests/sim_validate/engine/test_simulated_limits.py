@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from sim_validate.engine.limits_and_friction import OVERLOAD, bisected_limits, part, ramped_limits
-from sim_validate.engine.simulate import Load
+from sim_validate.engine.schedules import MOST_PLANNED, TrialLoad, part
+from sim_validate.engine.simulated_limits import bisected_limits, ramped_limits
 from tests.sim_validate.rigs import grasps, imbalance, limiting_loads, rig_of
 
 FAMILIES = ("concurrent", "pencil", "regulus", "free")
@@ -31,8 +31,9 @@ def test_a_limit_that_is_not_where_it_is_predicted_is_found_farther_away_or_not_
     body, (grasp, *_) = grasps("random-12-1", 0.5, 1)
     rig = rig_of(body, grasp, 0.5)
     (limit,) = limiting_loads(body, grasp, 0.5, 1)
+    idle = rig.idle.forces
     wrong = [
-        Load(factor * limit.wrench, rig.idle.forces + factor * (limit.forces - rig.idle.forces))
+        TrialLoad(factor * limit.wrench, idle + factor * (limit.forces - idle))
         for factor in (0.95, 1.05, 0.75, 1.3, 0.33, 3.0)
     ]
     for method in (ramped_limits, bisected_limits):
@@ -49,7 +50,7 @@ def test_planned_forces_balance_every_share_of_a_limit():
         body, (grasp,) = grasps(name, 0.5, 1)
         idle = rig_of(body, grasp, 0.5).idle
         for limit in limiting_loads(body, grasp, 0.5, 3):
-            for share in (0.0, 0.4, 1.0, 1.3, OVERLOAD):
+            for share in (0.0, 0.4, 1.0, 1.3, MOST_PLANNED):
                 load = part(idle, limit, share)
                 assert imbalance(load, body, grasp) < 1e-6
                 np.testing.assert_allclose(load.wrench, share * limit.wrench)

@@ -1,14 +1,10 @@
-"""Simulates trials of a scene, on MuJoCo's own threads, and lays out those of closure tests.
+"""Steps trials of a scene in MuJoCo, on its own threads: the loop that all simulations run in.
 
 The text of a scene is always what is compiled, so that the text is the whole experiment. All trials
 of a scene run together; each is bit for bit what a plain loop over `mj_step` gives, whatever the
 number of threads. A trial is what the scene is told in each sample: the wrench on the object, the
 servos' commands and, where a trial has them, forces on the palm, frictions, and the pose of a body
 that moves as told.
-
-Trials of closure are schedules: the forces planned for the fingers, the external wrench and the
-friction in each sample. Loads change smoothly, because long objects spring loose under a sudden
-start.
 """
 
 # pyright: basic, reportAttributeAccessIssue=false
@@ -22,9 +18,8 @@ from typing import Generic, TypeAlias, TypeVar
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices, cross, to_digits
+from grasp_core.arrays import Array, Indices
 from grasp_core.errors import InputError
-from scenes.mujoco.closure_scene import Layout
 from scenes.mujoco.mjcf_text import SceneText
 from scenes.mujoco.silent_mujoco import batch, mujoco, unlogged
 from scenes.mujoco.version_gaps import WRONG_FACTOR
@@ -35,11 +30,11 @@ STATE = (
 """Parts of a state, which lie in the order of their bits."""
 CLOCK = 0
 """Place of the time in a state."""
-FREE, PALM = 6, 12
+OBJECT_END, PALM_END = 6, 12
 """Joint velocities up to the end of the object's, and up to the end of the palm's."""
-FEWEST = 2
+FEWEST_SIMULATIONS = 2
 """Fewest trials that room is made for: one to close the fingers, and most controls have two."""
-CHUNK = 5
+CLOSURE_STEPS = 5
 """Simulation steps per sample of a closure trial."""
 CLOCK_SLACK_S = 1e-9
 """Largest clock error that counts as rounding [s]: simulated time is a sum of equal steps, and a
@@ -187,7 +182,7 @@ class Bench(Generic[AnyScene]):
 
     def __init__(
         self, scene: AnyScene, *, threads: int = 1, timeout_s: float = math.inf,
-        chunk: int = CHUNK, step_s: float | None = None, kept: Sequence[str] = (),
+        chunk: int = CLOSURE_STEPS, step_s: float | None = None, kept: Sequence[str] = (),
     ) -> None:  # fmt: skip
         self.scene, self.threads, self.chunk, self.kept = scene, threads, chunk, kept
         self.deadline = time.monotonic() + timeout_s
@@ -313,7 +308,7 @@ class Bench(Generic[AnyScene]):
         """Return the simulations of trials at their starts; they are made only once."""
         count = len(trials)
         if self.batch is None or self.batch.nsim < count:
-            self.batch = batch.Batch(self.model, max(count, FEWEST), self.threads)
+            self.batch = batch.Batch(self.model, max(count, FEWEST_SIMULATIONS), self.threads)
             self.frictions = None
         self.batch.reset(np.arange(count), stage=mujoco.mjtStage.mjSTAGE_NONE.value)
         if self.frictions is not None:
@@ -326,7 +321,7 @@ class Bench(Generic[AnyScene]):
                 joints[trial] = each.joints
             if each.velocity is not None:
                 speeds[trial, :3] += each.velocity
-                speeds[trial, FREE : FREE + 3] += each.velocity
+                speeds[trial, OBJECT_END : OBJECT_END + 3] += each.velocity
         return self.batch
 
     def _field(self, sims: batch.Batch, name: str) -> Array:
@@ -346,7 +341,7 @@ class Bench(Generic[AnyScene]):
         views = {
             "wrenches": self._field(sims, "xfrc_applied").reshape(sims.nsim, -1, 6)[:, self.body],
             "commands": self._field(sims, "ctrl"),
-            "palm": self._field(sims, "qfrc_applied")[:, FREE:PALM],
+            "palm": self._field(sims, "qfrc_applied")[:, OBJECT_END:PALM_END],
             "mocap": sims.state[:, moved],
         }
         if any(each.friction is not None for each in trials):
@@ -363,56 +358,3 @@ class Bench(Generic[AnyScene]):
                 own[: most if row is None else len(row)] = there if row is None else row
             told.append((view, values))
         return told
-
-
-def samples(duration_s: float, sample_s: float) -> int:
-    """Return the whole number of samples nearest to a duration, at least one."""
-    return max(1, round(duration_s / sample_s))
-
-
-def smooth(count: int) -> Array:
-    """Return numbers that rise from zero to one with no slope at either end, (count,)."""
-    time = np.arange(1, count + 1) / count
-    return time**2 * (3.0 - 2.0 * time)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Load:
-    """An external wrench with the contact forces planned to balance it."""
-
-    wrench: Array
-    """External wrench, (6,) [N, N m], torque about the centre of mass, world axes."""
-    forces: Array
-    """Contact forces on the object, (k, 3) [N], world axes."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Schedule:
-    """Wrench (n, 6), finger forces (n, k, 3) and friction in each of the n samples of a trial."""
-
-    wrenches: Array
-    forces: Array
-    friction: Array
-    watched: int
-    """Index of the first sample from which the object must stay where it is."""
-    resting: int
-    """Index of the first sample from which load and finger forces no longer change."""
-
-    def told(self, layout: Layout) -> Told:
-        """Return what the scene of a layout is told, rounded like its numbers (see `arrange`)."""
-        wrenches = self.wrenches.copy()
-        wrenches[:, 3:] -= cross(layout.center, wrenches[:, :3])
-        wrenches = np.hstack([to_digits(wrenches[:, :3]), to_digits(wrenches[:, 3:])])
-        commands = to_digits(layout.holder.efforts(self.forces)) / layout.holder.servo
-        return Told(wrenches, commands, friction=to_digits(self.friction)[:, None])
-
-    @staticmethod
-    def between(
-        start: Load, end: Load, shares: Array, frictions: tuple[float, float], watched: int,
-        resting: int,
-    ) -> "Schedule":  # fmt: skip
-        """Schedule shares of the way between loads; friction falls where watching begins."""
-        friction = np.where(np.arange(len(shares)) < watched, *frictions)
-        wrenches = start.wrench + shares[:, None] * (end.wrench - start.wrench)
-        forces = start.forces + shares[:, None, None] * (end.forces - start.forces)
-        return Schedule(wrenches, forces, friction, watched, resting)

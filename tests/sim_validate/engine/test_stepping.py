@@ -10,9 +10,9 @@ from mujoco import batch
 import grasp_core as gc
 from grasp_core.arrays import to_digits
 from scenes.mujoco.silent_mujoco import unlogged
-from sim_validate.engine import simulate
-from sim_validate.engine.limits_and_friction import part
-from sim_validate.engine.simulate import CHUNK, Bench, Load, compiled
+from sim_validate.engine import stepping
+from sim_validate.engine.schedules import TrialLoad, part
+from sim_validate.engine.stepping import CLOSURE_STEPS, Bench, compiled
 from sim_validate.engine.traces import Outcome, judge
 from sim_validate.settings import HoldProtocol
 from tests.sim_validate.rigs import limiting_loads
@@ -42,7 +42,7 @@ def plain_loop(scene, schedule, start):
         data.ctrl[:] = pushes.ravel() / layout.drive.stiffness_n_per_m
         data.xfrc_applied[model.body("object").id] = wrench
         model.geom_friction[touching, 0] = friction
-        mujoco.mj_step(model, data, nstep=CHUNK)
+        mujoco.mj_step(model, data, nstep=CLOSURE_STEPS)
         rows.append(data.qpos.copy())
     return np.array(rows)
 
@@ -74,13 +74,13 @@ def test_trials_without_frictions_have_the_scenes_after_trials_that_changed_them
 
 def test_a_good_hold_beside_a_blow_up_is_judged_on_its_own(held):
     _, _, rig = held
-    still = Load(np.zeros(6), rig.idle.forces)
+    still = TrialLoad(np.zeros(6), rig.idle.forces)
     layout = rig.bench.scene.layout
-    together = rig.hold([still, Load(np.full(6, 1e14), rig.idle.forces), still])
+    together = rig.traced(rig.holds([still, TrialLoad(np.full(6, 1e14), rig.idle.forces), still]))
     assert abs(together[1].health.clock_error_s) < 1e-9  # it is reported, and not reset
     outcomes = [judge(found, layout, HoldProtocol()).outcome for found in together]
     assert outcomes == [Outcome.HELD, Outcome.DIVERGED, Outcome.HELD]
-    (alone,) = rig.hold([still])
+    (alone,) = rig.traced(rig.holds([still]))
     np.testing.assert_array_equal(alone.displacements_m, together[2].displacements_m)
 
 
@@ -123,9 +123,9 @@ def test_the_newton_solver_is_refused_where_its_factor_is_wrong(
     body = "<body><joint/><geom size='.1'/></body>" * joints
     option = f"<option jacobian='{jacobian}' solver='{solver}'/>"
     scene = f"<mujoco>{option}<worldbody>{body}</worldbody></mujoco>"
-    monkeypatch.setattr(simulate, "WRONG_FACTOR", "none")
+    monkeypatch.setattr(stepping, "WRONG_FACTOR", "none")
     assert compiled(scene).nv == joints
-    monkeypatch.setattr(simulate, "WRONG_FACTOR", mujoco.mj_versionString())
+    monkeypatch.setattr(stepping, "WRONG_FACTOR", mujoco.mj_versionString())
     if is_wrong:
         with pytest.raises(gc.InputError, match="set jacobian to dense"):
             compiled(scene)
