@@ -55,7 +55,6 @@ ProtocolName = Literal[
     "mj-grasp-sim",
     "molmospaces",
 ]
-"""Names of the published tests, which `sim_validate/protocols` holds."""
 BARE = arg(name="", help="")
 """Mark of a group whose flags have no prefix; groups inside it keep theirs."""
 

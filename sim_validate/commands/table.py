@@ -171,7 +171,6 @@ dataset verify ds
 baseline record grasps.json -o wedge.baseline.json
 baseline check wedge.baseline.json --strict
 """.splitlines()
-"""Examples of all commands, without the program's name."""
 HELP = {"-h", "--help"}
 
 

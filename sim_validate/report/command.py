@@ -154,7 +154,6 @@ def shown_report(asked: flags.ReportFlags, reporter: Reporter) -> Report:
 
 
 SHOWN_ROWS = 12
-"""Number of rows of the motion that are shown; the trace file has all of them."""
 MICRO = 1e6
 
 

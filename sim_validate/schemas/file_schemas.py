@@ -43,7 +43,6 @@ REPOSITORY = "https://example.org/graspproof"
 """Address of the repository, which .github/workflows/release.yml puts here."""
 DRAFT = "https://json-schema.org/draft/2020-12/schema"
 IN_FILES = re.compile(r"\b(None|NaN)\b")
-"""What JSON lacks: files have null there."""
 
 
 class FileKind(NamedTuple):
@@ -172,12 +171,9 @@ class _OfFiles(GenerateJsonSchema):
 
 
 class _OfUsers(_OfFiles):
-    """Leaves out what users cannot set."""
-
     LEFT_OUT = CHOSEN
 
 
 def _about(kind: type, name: str, key: str) -> dict[str, str]:
-    """Return the meaning and the unit of a key, as far as it has them."""
     said = {"description": IN_FILES.sub("null", meanings(kind).get(name, "")), "unit": unit_of(key)}
     return {word: text for word, text in said.items() if text}
