@@ -288,3 +288,12 @@ class DoctorFlags(Spoken):
 
     compile: bool = False
     """Compile all inner loops first, on two cores if there are two, as for an image."""
+
+
+@declared
+class SchemaFlags(Spoken):
+    """Flags of the command `schema`."""
+
+    kind: Positional[str | None] = None
+    """A kind of files, such as `verdicts`, `verdicts.json` or `setup`; if not given, all kinds are
+    listed."""

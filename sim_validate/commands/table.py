@@ -107,7 +107,7 @@ COMMANDS: Mapping[str, Command] = {
         "List the names of the built-in objects.",
     ),
     "schema": Command(
-        "schemas.flags:SchemaFlags", "schemas.command:show_schema",
+        "commands.flags:SchemaFlags", "schemas.command:show_schema",
         "Print the JSON Schema of a kind of files, or list the kinds of files.",
     ),
     "doctor": Command(

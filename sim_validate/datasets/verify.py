@@ -196,7 +196,7 @@ class _Redoing:
         if not self._exact:
             yield from _loose_differences(stored, made.rows)
             return
-        for table, columns in self._dataset.tables.items():
+        for table, columns in self._dataset.manifest.tables.items():
             before, after = (rows.cells(table, columns) for rows in (stored, made.rows))
             yield from _differences(table, before, after)
         for path, text in made.files.items():
