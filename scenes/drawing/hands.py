@@ -27,6 +27,7 @@ from grasp_core.arrays import Shape as ArrayShape
 from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError
 from grasp_core.frames import POSE
+from grasp_core.geometry.polygons import FEWEST_CORNERS
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_arrays import hand_arrays, places
 from grasp_core.hands.reach import HandReach, with_balls
@@ -47,7 +48,6 @@ from scenes.drawing.painting import (
 )
 
 QUARTER_SIDES = 3
-FEWEST_CORNERS = 3
 ONE_CORNER = 1e-9
 """Distance below which corners of a box of size 1 are one: far above rounding."""
 Truths: TypeAlias = NDArray[np.bool_]

@@ -42,10 +42,9 @@ from scenes.drawing.pictures import (
     pin,
     sheet_of,
 )
-from scenes.drawing.sheets import svg_of
+from scenes.drawing.sheets import ASSETS, svg_of
 from scenes.mujoco.closure_scene import Layout, Scene
 
-ASSETS = Path(__file__).parent / "assets"
 NO_VALUE = "-"
 MILLION = 1e6
 """Size from which numbers are written with a power of ten."""

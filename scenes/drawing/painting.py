@@ -22,7 +22,7 @@ import numpy as np
 from grasp_core.arrays import Array, Indices, Point, Polygon
 from grasp_core.arrays import Shape as ArrayShape
 from grasp_core.declared import Declared, declared
-from grasp_core.geometry.polygons import convex_hull
+from grasp_core.geometry.polygons import FEWEST_CORNERS, convex_hull
 from grasp_core.kinds import Quantity, number
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.ties import first_best
@@ -180,7 +180,6 @@ EMPTY_MARGIN = 0.04
 CUT_RADII = 2.0
 NEVER_CUT: tuple[Role, ...] = ("hand", "fingertip")
 MANY_CORNERS = 60
-POLYGON = 3
 
 
 @declared
@@ -421,7 +420,7 @@ def _area(flats: Iterable[Array], colour: str, opacity: float, window: Window) -
     loops = tuple(map(window.place, flats))
     if sum(map(len, loops)) > MANY_CORNERS:
         loops = tuple(thinned(closed(loop))[:-1] for loop in loops)
-    return Area(tuple(loop for loop in loops if len(loop) >= POLYGON), colour, opacity)
+    return Area(tuple(loop for loop in loops if len(loop) >= FEWEST_CORNERS), colour, opacity)
 
 
 def _each(shape: Drawable, look: RoleLook, window: Window) -> Iterator[Near]:

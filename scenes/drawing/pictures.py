@@ -22,6 +22,7 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices, cross
 from grasp_core.cones.spanning import angles_between
+from grasp_core.geometry.polygons import FEWEST_CORNERS
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach
 from grasp_core.kinds import Friction, instance, path_of, value_of
@@ -41,7 +42,6 @@ from scenes.drawing.hands import (
 )
 from scenes.drawing.painting import (
     LOOKS,
-    POLYGON,
     Camera,
     Drawable,
     Extent,
@@ -203,7 +203,7 @@ class Drawing:
 
     def _region(self, finger: int) -> Iterator[Drawable]:
         region = self.grasp.regions[finger].polygon
-        if len(region) >= POLYGON:
+        if len(region) >= FEWEST_CORNERS:
             yield Drawable("region", finger, polygons=(region,))
 
     def _lines_to_foci(self) -> Iterator[Drawable]:

@@ -76,7 +76,7 @@ NAME_GROUND = np.array([(-12.0, -8.0), (12.0, -8.0), (12.0, 8.0), (-12.0, 8.0)])
 LABEL = 18.0
 MAP_ROWS = 60
 """Height of the image of a map [its own pixels]; the map is twice as wide."""
-MILLI = 1e3
+MILLI, MICRO = 1e3, 1e6
 USUAL_PUSH_N = FingerSettings().max_normal_force_n
 DIRECTION_DECIMALS = 12
 """Number of decimals to which two directions must agree to count as equal."""
@@ -355,7 +355,6 @@ SLIP_NAME = (1.0, "slips")
 """Share of its friction that a finger uses when it slips, and its name."""
 MOST_SHARE = 1.15
 """Upper end of an axis, relative to the limit on it."""
-MICRO = 1e6
 LEAST_UM = 1e-4
 """Displacement at which the chart's logarithmic axis begins [um]."""
 LEAST_PUSH = 1e-3

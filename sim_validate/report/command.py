@@ -24,6 +24,7 @@ from scenes.drawing.clips import GraphicsError, has_display, write_clip, write_t
 from scenes.drawing.pages import turntable_page
 from scenes.drawing.pictures import Drawing
 from scenes.mujoco.closure_scene import Scene, build_scene, write_scene
+from scenes.mujoco.scene_text import HOME
 from scenes.settings import FingerSettings
 from sim_validate.closure.replaying import Recorded, Replayed, Wanted, recorded_in, replayed
 from sim_validate.commands import flags
@@ -33,6 +34,7 @@ from sim_validate.datasets.open_dataset import recorded_in_dataset
 from sim_validate.engine.setup import with_planned_radius
 from sim_validate.files.output_folders import alone_in
 from sim_validate.planning.asked_objects import grasp_with_id
+from sim_validate.report.charts import MICRO
 from sim_validate.report.report import Report, write_report
 from sim_validate.report.run_folder import RunFolder, folder_of, reaches_beside
 from sim_validate.report.sections import why_not_held
@@ -115,8 +117,7 @@ def closing(scene: Scene) -> Array:
     away = np.einsum("kij,ki->kj", layout.frames, layout.approach).ravel()
     left = np.linspace(1.0, 0.0, COMING) ** 2
     slides = np.vstack([left[:, None] * away, np.zeros((FRAMES_RESTING, len(away)))])
-    home = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
-    return np.column_stack([np.tile(home, (len(slides), 1)), slides])
+    return np.column_stack([np.tile(HOME, (len(slides), 1)), slides])
 
 
 def report_folder(command: flags.ReportFlags, reporter: Reporter) -> int:
@@ -154,7 +155,6 @@ def shown_report(asked: flags.ReportFlags, reporter: Reporter) -> Report:
 
 
 SHOWN_ROWS = 12
-MICRO = 1e6
 
 
 def replay_trial(command: flags.ReplayFlags, reporter: Reporter) -> int:

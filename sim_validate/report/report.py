@@ -41,6 +41,7 @@ from sim_validate.protocols.verdict import Totals
 from sim_validate.report import sections
 from sim_validate.report.cards import Card, Paged, cards_to_draw, draw, largest_push
 from sim_validate.report.charts import (
+    MILLI,
     as_predicted,
     fidelity_panel,
     frictions_in,
@@ -59,7 +60,7 @@ from sim_validate.report.run_folder import (
 from sim_validate.report.sections import TemplateData
 
 ASSETS = Path(__file__).parent / "assets"
-MILLI, PERCENT = 1e3, 100.0
+PERCENT = 100.0
 FAMILY_MEANINGS = {
     "concurrent": "the lines of force meet in one point",
     "pencil": "two pairs of lines, which meet in points of a common line",

@@ -24,6 +24,7 @@ from sim_validate.execution.verdict import (
     totals_in_words,
 )
 from sim_validate.hands.flags import Reach
+from sim_validate.report.charts import MILLI
 from sim_validate.report.run_folder import (
     BAD_TONE,
     GOOD_TONE,
@@ -47,7 +48,6 @@ EXECUTION_FIGURES: Sequence[Figure] = figures(ExecutedGrasp)[1:]
 """Figures of executed grasps, but for the id, which leads to a grasp's page."""
 FINGERS_MEANING = "that touch at the grasp's contacts, by finger of the grasp"
 HAND_TITLE_FIGURES = ("grasp", "id")
-MILLI = 1e3
 ALWAYS = ("mass_kg", "seed")
 """Settings of executions whose usual value depends on the object or on the plan."""
 
