@@ -2,19 +2,15 @@
 
 import importlib
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_args
 
 import numpy as np
 
-from grasp_core.arrays import Array
 from grasp_core.errors import InputError
 from grasp_core.files.text_files import write_parts
 from grasp_core.frames import poses_along
 from grasp_core.kinds import SMALLEST, instance, number, one_of, path_of
-from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.result import Plan
 from grasp_core.values import Grasp
 from scenes.drawing import sheets
@@ -31,49 +27,7 @@ ROD_SIDES = 24
 ROUGHNESS = 0.6
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class PlacedGrasp:
-    """One grasp as it is shown: poses are (4, 4) matrices that map to the object's frame."""
-
-    grasp: Grasp
-    offset: Array
-    """Where the object's frame stands in a file with several grasps, (3,) [m]."""
-    contacts: Array
-    """Pose at each contact, (4, 4, 4) [m]: the origin is the contact, z the inward normal."""
-    tip_radius: float
-    rods: Array
-    """Pose of each finger's rod, (4, 4, 4) [m]: the origin is the centre of the tip, and z is the
-    direction in which the finger comes in; the rod lies behind the origin."""
-    rod_length: float
-    figures: Mapping[str, str | float]
-    """What is known of the grasp, by the names that tables have: see `Plan.to_dataframe`."""
-
-
-def placed_grasps(plan: Plan, fingertip_radius_m: float | None) -> tuple[PlacedGrasp, ...]:
-    """Place every grasp of a plan, in order."""
-    radius, length = fingertip_radius_m, ROD_LENGTH * plan.body.radius
-    if plan.finger is not None:
-        radius, length = radius or plan.finger.radius_m, plan.finger.approach_m
-    columns = math.ceil(math.sqrt(len(plan)))
-    step = GRID_SPACING * (plan.body.radius + length)
-    return tuple(
-        PlacedGrasp(
-            grasp=grasp,
-            offset=step * np.array([place % columns, place // columns, 0.0]),
-            contacts=grasp.contact_frames(),
-            tip_radius=(tip := radius or fitting_radius(plan.body, grasp.positions, grasp.normals)),
-            rods=poses_along(
-                grasp.positions - tip * grasp.normals,
-                approaches(grasp),
-            ),
-            rod_length=length,
-            figures=_figures(plan, grasp),
-        )
-        for place, grasp in enumerate(plan.grasps)
-    )
-
-
-def _figures(plan: Plan, grasp: Grasp) -> Mapping[str, str | float]:
+def _figures(plan: Plan, grasp: Grasp) -> dict[str, str | float]:
     lower, upper = grasp.ferrari_canny
     numbers = {
         "friction": plan.friction,
@@ -88,32 +42,42 @@ def _figures(plan: Plan, grasp: Grasp) -> Mapping[str, str | float]:
     return {"id": grasp.id, "family": grasp.family, **finite}
 
 
-def glb(body: Polyhedron, grasps: tuple[PlacedGrasp, ...]) -> bytes:
-    """Return the bytes of a GLB file; equal grasps give equal bytes."""
+def glb(plan: Plan, fingertip_radius_m: float | None) -> bytes:
+    """Return the bytes of a GLB file; equal plans give equal bytes."""
     trimesh: Any = importlib.import_module("trimesh")
+    body, radius, length = plan.body, fingertip_radius_m, ROD_LENGTH * plan.body.radius
+    if plan.finger is not None:
+        radius, length = radius or plan.finger.radius_m, plan.finger.approach_m
+    columns, step = math.ceil(math.sqrt(len(plan))), GRID_SPACING * (body.radius + length)
     scene = trimesh.Scene()
     scene.geometry["object"] = _painted(trimesh, body.to_trimesh(), sheets.GLASS)
-    for place, placed in enumerate(grasps):
-        _add_grasp(trimesh, scene, f"grasp_{place}", placed)
+    for place, grasp in enumerate(plan.grasps):
+        here, name = np.eye(4), f"grasp_{place}"
+        here[:2, 3] = step * (place % columns), step * (place // columns)
+        scene.graph.update(name, matrix=here, metadata=_figures(plan, grasp))
+        scene.graph.update(f"{name}_object", name, matrix=np.eye(4), geometry="object")
+        tip_radius = radius or fitting_radius(body, grasp.positions, grasp.normals)
+        _add_fingers(trimesh, scene, name, grasp, tip_radius, length)
     return scene.export(file_type="glb")
 
 
-def _add_grasp(trimesh: Any, scene: Any, name: str, placed: PlacedGrasp) -> None:
-    here = np.eye(4)
-    here[:3, 3] = placed.offset
-    scene.graph.update(name, matrix=here, metadata=dict(placed.figures))
-    scene.graph.update(f"{name}_object", name, matrix=np.eye(4), geometry="object")
-    for finger, (contact, rod) in enumerate(zip(placed.contacts, placed.rods, strict=True)):
-        tip, bar = _shapes(trimesh, scene, placed, finger)
+def _add_fingers(
+    trimesh: Any, scene: Any, name: str, grasp: Grasp, radius: float, length: float
+) -> None:
+    # the origin of a rod's frame is the centre of the tip, and the rod lies behind it
+    rods = poses_along(grasp.positions - radius * grasp.normals, approaches(grasp))
+    for finger, (contact, rod) in enumerate(zip(grasp.contact_frames(), rods, strict=True)):
+        tip, bar = _shapes(trimesh, scene, finger, radius, length)
         named = f"{name}_finger_{finger}"
         told = {"position_m": contact[:3, 3], "normal": contact[:3, 2]}
         scene.graph.update(named, name, matrix=contact, geometry=tip, metadata=told)
         scene.graph.update(f"{named}_rod", name, matrix=rod, geometry=bar)
 
 
-def _shapes(trimesh: Any, scene: Any, placed: PlacedGrasp, finger: int) -> tuple[str, str]:
+def _shapes(
+    trimesh: Any, scene: Any, finger: int, radius: float, length: float
+) -> tuple[str, str]:  # fmt: skip
     """Make the shapes of a finger, unless an earlier grasp has the same; return their names."""
-    radius, length = placed.tip_radius, placed.rod_length
     tip, bar = f"tip_{finger}_{radius!r}", f"rod_{finger}_{radius!r}_{length!r}"
     if tip not in scene.geometry:
         ball = trimesh.creation.uv_sphere(radius=radius, count=[ROD_SIDES // 2, ROD_SIDES])
@@ -169,5 +133,4 @@ def export_grasps(
                where=", the object's radius in m")  # fmt: skip
     if not plan.grasps:
         raise InputError("plan: expected at least one grasp to export, found none")
-    placed = placed_grasps(plan, fingertip_radius_m)
-    return write_parts(path, [glb(plan.body, placed)])
+    return write_parts(path, [glb(plan, fingertip_radius_m)])

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
 GraspFormat: TypeAlias = Literal["gltf"]
 EXPORT_ENDINGS: Mapping[GraspFormat, tuple[str, ...]] = {"gltf": (".glb",)}
-"""Endings of the files that grasps are exported to, by format."""
 SurfaceChoice = Literal["object", "pads"]
 DriveKind: TypeAlias = Literal["servo", "rigid"]
 

@@ -105,7 +105,6 @@ def _parsed(arguments: list[str]) -> tuple[str, "Spoken"]:
 
 
 def _config_of(arguments: list[str]) -> tuple[Path | None, list[str]]:
-    """Return the path after `--config`, if it is given, and the other words."""
     words = [
         part
         for word in arguments
@@ -190,7 +189,6 @@ def _dispatch(name: str, command: "Spoken") -> int:
 
 
 def _warn(name: str, command: Any, reporter: "Reporter") -> None:
-    """Warn of loops that are compiled again and again, and of results that nobody will see."""
     from grasp_core.compiled import why_not_kept
 
     if name not in ("objects", "doctor") and (faults := why_not_kept()):

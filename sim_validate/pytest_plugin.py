@@ -25,7 +25,6 @@ NOTE, TOLD_AT_END, WROTE = "mesh_note", "grasp_change", "baseline_written"
 """Properties of tests that the terminal shows at the end: pytest carries them between processes."""
 MOST_TOLD = 40
 Properties: TypeAlias = Sequence[tuple[str, object]]
-"""Names and values that a test has kept."""
 
 
 class UnstableError(AssertionError):
@@ -247,7 +246,6 @@ def _require(
     item: pytest.Item, name: str, status: str, figures: Mapping[str, object], source: "SourceMesh",
     why: str,
 ) -> None:  # fmt: skip
-    """Keep what a test found out about a grasp, and fail if that is not as it must be."""
     item.user_properties += [(f"{name}.{key}", value) for key, value in figures.items()]
     _note(item, f"{name}.status", status, source)
     if why:

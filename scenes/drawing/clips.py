@@ -27,11 +27,9 @@ from scenes.mujoco.held_scene import HeldScene
 
 CLIP_TYPES = (".gif", ".webp")
 ANGLES_DEG = (-50.0, 25.0)
-"""Default azimuth and elevation of the camera [deg]."""
 SIZE = (480, 360)
 """Width and height of the picture [pixels]."""
 RATE = 25.0
-"""Frames per second of a clip."""
 SLOWER = 1.0 / (RATE * 0.01)
 """Factor by which clips of trials are slower than reality, with a sample of 10 ms in each frame."""
 SHOWN_REACH = 0.9

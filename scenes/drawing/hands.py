@@ -27,6 +27,7 @@ from grasp_core.arrays import Shape as ArrayShape
 from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError
 from grasp_core.frames import POSE_SIZE
+from grasp_core.geometry.polygons import FEWEST_CORNERS
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_arrays import hand_arrays, places
 from grasp_core.hands.reach import HandReach, with_balls
@@ -47,13 +48,10 @@ from scenes.drawing.painting import (
 )
 
 QUARTER_SIDES = 3
-"""Number of sides along a quarter of a circle."""
-FEWEST_CORNERS = 3
 ONE_CORNER = 1e-9
 """Distance below which corners of a box of size 1 are one: far above rounding."""
 Truths: TypeAlias = NDArray[np.bool_]
 BoxEnds: TypeAlias = tuple[bool, ...]
-"""A truth about each axis of a box."""
 LONG, LEAST_RADII = 1.2, 2.5
 """Length of a piece of a part in thicknesses of the part, but at least so many radii of the hand's
 largest fingertip."""
@@ -80,7 +78,6 @@ contact."""
 
 
 WHOLE_BOX = np.ones((2, 3), dtype=bool)
-"""Ends of a rounded box of which nothing is cut off."""
 
 
 def rounded_box(low: Array, high: Array, radius: float, outer: Truths) -> tuple[Array, ...]:

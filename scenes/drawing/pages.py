@@ -43,22 +43,18 @@ from scenes.drawing.pictures import (
     pin,
     sheet_of,
 )
-from scenes.drawing.sheets import svg_of
+from scenes.drawing.sheets import ASSETS, svg_of
 from scenes.mujoco.closure_scene import Layout, Scene
 
-ASSETS = Path(__file__).parent / "assets"
-"""Folder of the templates, styles and scripts of single drawings."""
 NO_VALUE = "-"
 MILLION = 1e6
 """Size from which numbers are written with a power of ten."""
 OF_OBJECT = ("object", "edge")
-"""Roles of what the grasps of one object share."""
 PER_RADIUS = 1000.0
 """Number of units of length in one object radius."""
 CM3 = 1e6
 PAGE_WIDTH, PAGE_HEIGHT = 900, 640
 Fact: TypeAlias = tuple[str, str, str]
-"""Name, value and meaning of a figure on a page."""
 DISC = "radius of the largest disc that fits each region: there every finger may stand anywhere"
 CRITICAL = "least coefficient with which the contacts are in force closure; 0: none is needed"
 MARGIN_SAID = (
@@ -102,7 +98,6 @@ def _environment(folder: Path) -> Any:
 
 
 def _printed(value: object) -> object:
-    """Remove control characters from text; return other values unchanged."""
     if type(value) is not str or value.isprintable():
         return value
     return "".join(c if c.isprintable() or c == "\n" else " " for c in value)
@@ -252,7 +247,6 @@ def _shape(shape: Drawable, body: Polyhedron) -> dict[str, Any]:
 
 
 def _whole(points: Array, body: Polyhedron) -> Any:
-    """Write points in units of the drawing, as lists of any depth."""
     return np.rint(PER_RADIUS / body.radius * (points - body.center_of_mass)).astype(int).tolist()
 
 

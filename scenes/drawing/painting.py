@@ -22,7 +22,7 @@ import numpy as np
 from grasp_core.arrays import Array, Indices, Point, Polygon
 from grasp_core.arrays import Shape as ArrayShape
 from grasp_core.declared import Declared, declared
-from grasp_core.geometry.polygons import convex_hull
+from grasp_core.geometry.polygons import FEWEST_CORNERS, convex_hull
 from grasp_core.kinds import Quantity, number
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.ties import first_best
@@ -157,18 +157,14 @@ Role: TypeAlias = Literal[
     "plane", "ruled surface", "contact", "hand", "fingertip",
 ]  # fmt: skip
 Near: TypeAlias = tuple[float, Mark]
-"""A mark and its position along the line of sight [m]; larger values are nearer to the viewer."""
 SMOOTH_DEG = 20.0
 """Angle between the normals of two parts up to which their common edge is not drawn [deg]."""
 MOST_DRAWN_EDGES = 1500
-"""Largest number of edges drawn; of more, as scans have them, only the sharpest are drawn."""
 MERGED_CORNERS = 1e-6
-"""Distance up to which two corners count as one, relative to the size of the surface."""
 LIGHT_DIRECTION = np.array([-0.4, 0.7, 0.6]) / np.linalg.norm([-0.4, 0.7, 0.6])
 """Direction towards the light, as (right, up, towards the viewer): from the left, above and in
 front."""
 DARKEST = 0.55
-"""Brightness of a side that faces away from the light, as a share of its colour."""
 DASHES_PER_WIDTH = 24
 """Number of parts, every other one drawn, in a dashed line as long as the picture is wide."""
 PIECES = 8
@@ -180,16 +176,10 @@ SHADES = 7
 """Number of shades of joined surfaces and of round bars: hardly fewer than eight bits tell apart in
 clear glass."""
 SHORT_LINED: tuple[Role, ...] = ("friction cone",)
-"""Roles whose lines are short, so that each is drawn whole."""
 EMPTY_MARGIN = 0.04
-"""Width of the empty margin, as a share of the picture's width."""
 CUT_RADII = 2.0
-"""Distance from the object's centre beyond which points may be cut off, in object radii."""
 NEVER_CUT: tuple[Role, ...] = ("hand", "fingertip")
-"""Roles of which nothing is cut off, however far from the object it is."""
 MANY_CORNERS = 60
-"""Number of corners of an area above which those that are not seen are left out."""
-POLYGON = 3
 
 
 @declared
@@ -422,7 +412,6 @@ def _parts(shape: Drawable, window: Window) -> Iterator[Near]:
 
 
 def _thick(look: RoleLook, window: Window) -> float:
-    """Return how wide lines are on the sheet [pixels]."""
     return round(0.01 * look.line * window.side, 3)
 
 
@@ -431,7 +420,7 @@ def _area(flats: Iterable[Array], colour: str, opacity: float, window: Window) -
     loops = tuple(map(window.place, flats))
     if sum(map(len, loops)) > MANY_CORNERS:
         loops = tuple(thinned(closed(loop))[:-1] for loop in loops)
-    return Area(tuple(loop for loop in loops if len(loop) >= POLYGON), colour, opacity)
+    return Area(tuple(loop for loop in loops if len(loop) >= FEWEST_CORNERS), colour, opacity)
 
 
 def _each(shape: Drawable, look: RoleLook, window: Window) -> Iterator[Near]:

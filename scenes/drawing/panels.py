@@ -14,24 +14,19 @@ NARROW_LETTERS, WIDE = set("ijl.,:;|'!fItr()[] -"), set("mwMW@%+=<>≤")
 NARROW_WIDTH, USUAL_WIDTH, WIDE_WIDTH = 0.42, 0.66, 1.0
 """Widths of letters in DejaVu Sans, the widest of common fonts, in letter sizes."""
 LONG_RANGE = 300.0
-"""Ratio of an axis's ends above which the axis shows only powers of ten."""
 NICE = (1.0, 2.0, 5.0, 10.0)
-"""Steps between ticks, times powers of ten."""
 PANEL_EDGE = 8.0
 TICK_WAY = 4.0
 SMALL_TYPE = 11.0
 ROW, SAMPLE = 16.0, 18.0
 CURVE_TOLERANCE = 0.2
-"""Distance by which a drawn curve may miss its points [pixels]."""
 Marker: TypeAlias = Literal["disc", "square", "cross"]
 Kind: TypeAlias = Literal["line", "dashes", "area"] | Marker
-"""What stands beside a text of a key."""
 MARKER_CORNERS: dict[str, tuple[tuple[float, float], ...]] = {
     "square": ((-0.9, -0.9), (0.9, -0.9), (0.9, 0.9), (-0.9, 0.9)),
     "cross": ((-0.5, 0.0), (-1.0, -0.5), (-0.5, -1.0), (0.0, -0.5), (0.5, -1.0), (1.0, -0.5),
               (0.5, 0.0), (1.0, 0.5), (0.5, 1.0), (0.0, 0.5), (-0.5, 1.0), (-1.0, 0.5)),
 }  # fmt: skip
-"""Corners of markers of size 1, (x, y) with y downwards."""
 
 
 def width_of(text: str, size: float) -> float:

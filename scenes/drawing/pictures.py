@@ -22,6 +22,7 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices, cross
 from grasp_core.cones.spanning import angles_between
+from grasp_core.geometry.polygons import FEWEST_CORNERS
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach
 from grasp_core.kinds import Friction, instance, path_of, value_of
@@ -41,7 +42,6 @@ from scenes.drawing.hands import (
 )
 from scenes.drawing.painting import (
     LOOKS,
-    POLYGON,
     Camera,
     Drawable,
     Extent,
@@ -62,9 +62,7 @@ squared reach."""
 BAR_LENGTH, BAR_RADIUS, BALL_RADIUS = 0.75, 0.04, 0.1
 """Length and radius of a finger's bar, and radius of its fingertip, in finger sizes."""
 NUMBER_OFFSET = 0.12
-"""Distance of a finger's number from the end of its bar, in finger sizes."""
 CONE_LENGTH = 0.42
-"""Length of a cone's sides, in finger sizes."""
 STOUT = 1.3
 """Finger size over the radius of a ball of the object's volume: compact objects have fingers in
 proportion to their radius, and long or thin ones fingers in proportion to how thick they are."""
@@ -79,9 +77,7 @@ has its plane drawn, in object radii; the foci of built-in objects are within th
 SLACK_RAD = 1e-6
 """Angle by which rounding may make a force cone exceed its friction cone [rad]."""
 MOST_TRIANGLES = 2500
-"""Largest number of triangles drawn for the object; finer surfaces are simplified first."""
 CIRCLE = 20
-"""Number of corners of the polygons that replace circles."""
 
 
 PIXELS = 500
@@ -91,7 +87,6 @@ NUMBER, NUMBER_SHARE = 8.0, 0.028
 picture's width."""
 FINGER_LABELS = tuple((str(finger), colour) for finger, colour in enumerate(FINGER_COLOURS))
 MOST_NUMBERED = 20
-"""Largest number of faces that have their numbers on a picture of the object."""
 AZIMUTH_DEG, OBJECT_ELEVATION_DEG = 35.0, 28.0
 """The view of an object without fingers [deg]."""
 KEY_ROLES: tuple[Role, ...] = (
@@ -208,7 +203,7 @@ class Drawing:
 
     def _region(self, finger: int) -> Iterator[Drawable]:
         region = self.grasp.regions[finger].polygon
-        if len(region) >= POLYGON:
+        if len(region) >= FEWEST_CORNERS:
             yield Drawable("region", finger, polygons=(region,))
 
     def _lines_to_foci(self) -> Iterator[Drawable]:

@@ -82,20 +82,15 @@ FONT_FAMILY, FONT_FILES = "DejaVu Sans", ("DejaVuSans.ttf", "DejaVuSans-Bold.ttf
 """The letters of PNG files: Latin and Greek ones and signs of DejaVu Sans 2.37."""
 LETTER = 12.0
 ROUND_CORNERS = 48
-"""Number of corners of a polygon that replaces a circle."""
 Anchor: TypeAlias = Literal["start", "middle", "end"]
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 PALETTE, BITS = 3, 8
 """PNG's number for pixels that name a colour of a palette, and the bits of such a name."""
 PARTS_PER_PIXEL = 4
-"""Number of parts of a pixel in which places are written."""
 BASELINE_DROP = 0.35
-"""Distance of the baseline of letters below their middle, in letter sizes."""
 FONT = "system-ui,sans-serif"
 DASH_LENGTHS = "20 16"
-"""Lengths of dashes and of the gaps between them [parts of pixels]."""
 SvgAttributes: TypeAlias = tuple[tuple[str, str], ...]
-"""Names and values of presentation attributes."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -329,7 +324,6 @@ def _names(runs: Iterable[tuple[bool, list[Mark]]]) -> dict[SvgAttributes, str]:
 
 
 def _drawn(marks: Iterable[Mark], names: Mapping[SvgAttributes, str]) -> str:
-    """Write areas, lines and dots; neighbours that look alike share a group."""
     groups = list[str]()
     for look, alike in groupby(marks, key=_look):
         attributes, paths = _attributes(look, names), [_path(mark) for mark in alike]

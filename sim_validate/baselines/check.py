@@ -124,7 +124,6 @@ def measured(
 
 
 def _as_seen_from(baseline: Path, grasps: Path) -> str:
-    """Return the path by which a baseline names its grasps."""
     try:
         return Path(os.path.relpath(grasps, baseline.parent)).as_posix()
     except ValueError as error:
@@ -135,7 +134,6 @@ def _as_seen_from(baseline: Path, grasps: Path) -> str:
 
 
 def _or_refusal(work: Callable[[Any], Any], beginning: str, job: Any) -> Any:
-    """Return what a job gives, or why it is refused."""
     try:
         return work(job)
     except OWN_FAULTS as error:
@@ -195,7 +193,6 @@ def check(
 
 
 def _carried(now: Present) -> Carried | None:
-    """Say what a comparison must know of a part that is not the planned or the recorded one."""
     known = now.carried is not None or now.since is not None or bool(now.change)
     return Carried(now.change, now.gone) if known else None
 
@@ -309,7 +306,6 @@ def in_words(trial: WrenchVerdict) -> str:
 
 
 def _figures(finding: Finding) -> Iterator[str]:
-    """Yield a line for each figure of a grasp, in the baseline and now."""
     entries = (finding.before, finding.after)
     if entries == (None, None):
         return

@@ -61,7 +61,6 @@ def check_baseline(command: baseline_flags.CheckFlags, reporter: Reporter) -> in
 
 
 def _say_mesh(now: Present, reporter: Reporter) -> None:
-    """Say what must be known about the mesh that was tested, and which grasps it lost."""
     if now.note:
         reporter.say(now.note)
     for name, why in list(now.gone.items())[:TABLE_ROWS]:

@@ -345,7 +345,6 @@ def _settings_changed(where: str, before: Any, after: Any) -> Iterator[str]:
 
 
 def _by_name(value: Any) -> Any:
-    """Return a list of named wrenches by their names, and all else as it is."""
     items = cast("list[Any]", value if isinstance(value, list) else [None])
     if not all(isinstance(item, dict) for item in items):
         return cast("Any", value)

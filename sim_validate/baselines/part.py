@@ -90,7 +90,6 @@ def source_of(
 
 
 def _beside(name: str, folders: Iterable[Path]) -> list[Path]:
-    """List mesh files with a given name, sorted within each folder that can be read."""
     found = list[Path]()
     for folder in {folder.resolve(): folder for folder in folders}.values():
         with suppress(OSError):
@@ -307,7 +306,6 @@ def present(
 
 
 def _carried(saved: Plan, path: Path, file: Path, asked: IfChanged) -> tuple[str, Transfer]:
-    """Read the changed part, in the unit that is returned, and carry the grasps over to it."""
     try:
         check_planar(saved.body, "the old part")
         scale = asked.scale or 1.0

@@ -36,7 +36,6 @@ from sim_validate.settings import ExecutionSettings, LimitSearch, Noise
 
 SUITE_ENDING = ".grasps.toml"
 AGENDA_SETTINGS = ("limits", "random_wrenches", "repeats", "noise", "seed")
-"""Settings that replace those of the agenda of the baseline."""
 
 
 @declared(slots=False)
@@ -146,7 +145,6 @@ class Suite(Settings):
         return check.measured(now, self.files, before and before.limit, how).bless()
 
     def _how(self, before: Baseline | None) -> How:
-        """Take the baseline's settings, or the default ones, replaced by those of the file."""
         if before is None:
             how = How(check.setup_for(self.saved, None), Agenda(seed=self.saved.seed))
         else:

@@ -43,7 +43,6 @@ def _named(settings: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str,
 
 
 def _read(path: Path, command: Any) -> list[str]:
-    """Read a file of settings as words of a command line."""
     # imported only when there is a file to read
     from sim_validate.files.toml_files import read_tables
 

@@ -27,7 +27,6 @@ from sim_validate.processes.interrupts import check_interrupted
 Result = TypeVar("Result")
 File = TypeVar("File", bound=RecordFile)
 PLAIN_EVERY_S = 5.0
-"""Time between two lines of progress if the output is no terminal [s]."""
 RECENT = 7
 """Number of lines of progress over which the rate is taken: half a minute, as that of bars."""
 ENOUGH_SHARE, ENOUGH_STEPS = 0.02, 20
@@ -51,7 +50,6 @@ def duration(seconds: float) -> str:
 
 
 COLUMN_GAP, TABLE_MARGIN = 2, 1
-"""Widths of the space behind a column of a table, and before the first one, in characters."""
 TABLE_ROWS = 20
 """Largest number of rows shown in a table; files and JSON documents have all of them."""
 
@@ -237,7 +235,6 @@ class Steps:
             self.bar.update(self.task, completed=done, total=total, description=shown)
 
     def _beat(self) -> None:
-        """Print a line of progress now and then until the work is over."""
         while not self._over.wait(PLAIN_EVERY_S):
             self.console.print(Text(printable(self._line())), soft_wrap=True)
 

@@ -1,4 +1,4 @@
-"""Names of all flags of a command, and how lists and vectors are written on the command line.
+"""Turns the text of a flag into its value, where tyro does not know its type, and lists all flags.
 
 A list is written with commas, as in `--families pencil,regulus`, and a vector with spaces.
 """

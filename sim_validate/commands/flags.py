@@ -1,5 +1,6 @@
 """The flags of commands: one class per command, one field per flag, and groups that they share.
 
+The range of a flag is that of its type; ranges that several flags share are in `grasp_core/kinds`.
 This module imports nothing that is slow to load, so that help and usage errors answer at once.
 """
 
@@ -55,7 +56,6 @@ ProtocolName = Literal[
     "mj-grasp-sim",
     "molmospaces",
 ]
-"""Names of the published tests, which `sim_validate/protocols` holds."""
 BARE = arg(name="", help="")
 """Mark of a group whose flags have no prefix; groups inside it keep theirs."""
 
@@ -289,3 +289,12 @@ class DoctorFlags(Spoken):
 
     compile: bool = False
     """Compile all inner loops first, on two cores if there are two, as for an image."""
+
+
+@declared
+class SchemaFlags(Spoken):
+    """Flags of the command `schema`."""
+
+    kind: Positional[str | None] = None
+    """A kind of files, such as `verdicts`, `verdicts.json` or `setup`; if not given, all kinds are
+    listed."""

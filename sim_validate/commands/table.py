@@ -107,7 +107,7 @@ COMMANDS: Mapping[str, Command] = {
         "List the names of the built-in objects.",
     ),
     "schema": Command(
-        "schemas.flags:SchemaFlags", "schemas.command:show_schema",
+        "commands.flags:SchemaFlags", "schemas.command:show_schema",
         "Print the JSON Schema of a kind of files, or list the kinds of files.",
     ),
     "doctor": Command(
@@ -171,7 +171,6 @@ dataset verify ds
 baseline record grasps.json -o wedge.baseline.json
 baseline check wedge.baseline.json --strict
 """.splitlines()
-"""Examples of all commands, without the program's name."""
 HELP = {"-h", "--help"}
 
 

@@ -24,7 +24,6 @@ from sim_validate.files.locks import entries
 from sim_validate.files.output_folders import alone_in
 
 OWN_FILES = ("staging", DATA, *EXTRAS, GIVEN_CONTACTS, CONFIG, QUARANTINE, CARD, MANIFEST)
-"""Names of all files and folders that the folder of a dataset may hold."""
 
 
 class Built(NamedTuple):
@@ -100,7 +99,6 @@ def _check_simulator(config: DatasetConfig, units: Sequence[WorkUnit]) -> None:
 
 
 def _finished(folder: Path, units: Sequence[WorkUnit]) -> Manifest:
-    """Read the manifest of a finished dataset, and check that it is the one asked for."""
     manifest = read_manifest(folder)
     if manifest.units_sha256 != units_sha256(units):
         raise InputError(

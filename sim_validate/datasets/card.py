@@ -26,12 +26,10 @@ CARD = "README.md"
 HUB_SIZES = ("1K", "10K", "100K", "1M", "10M", "100M", "1B", "10B", "100B")
 """Powers of ten, from a thousand, as the Hugging Face Hub names sizes of datasets."""
 MARKDOWN_MARKS = frozenset("\\`*_[]<>|~&#!$@")
-"""Characters that can begin Markdown or HTML within a line."""
 SPDX = re.compile(r"[A-Za-z0-9.+-]+")
 """Pattern of a licence's name in SPDX; in small letters it is that of the Hugging Face Hub, but for
 a few such as ODbL-1.0, there `odbl`."""
 ADDRESS = re.compile(r"https?://[^\s<>\"'`\\|{}^]+")
-"""Pattern of a web address that can stand in Markdown as a link unchanged."""
 
 
 def card_text(config: DatasetConfig, manifest: Manifest) -> str:
@@ -68,7 +66,6 @@ def card_text(config: DatasetConfig, manifest: Manifest) -> str:
 
 
 def _size(rows: int) -> str:
-    """Return the name that the Hugging Face Hub has for datasets of about as many rows."""
     place = min(max(len(str(rows)) - 3, 0), len(HUB_SIZES) - 1)
     return f"{HUB_SIZES[place - 1]}<n<{HUB_SIZES[place]}" if place else f"n<{HUB_SIZES[0]}"
 

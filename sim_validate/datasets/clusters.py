@@ -32,7 +32,6 @@ ANY_PORT = "127.0.0.1:0"
 """Address at which a Dask scheduler started here shows its state: for this machine only, at any
 free port."""
 ANSWER_S = 10.0
-"""Time that a scheduler may take to answer [s]."""
 
 
 @dataclass(slots=True)
@@ -80,7 +79,6 @@ def ray_workers(workers: int, address: str | None) -> Generator[Cluster]:
 
 @contextmanager
 def _environment(settings: Mapping[str, str]) -> Generator[None]:
-    """Set variables of the environment that are not set, until the end of the block."""
     new = {name: value for name, value in settings.items() if name not in os.environ}
     os.environ.update(new)
     try:

@@ -38,14 +38,12 @@ from sim_validate.execution.verdict import Execution, ExecutionTrial
 from sim_validate.files.kept_figures import Kept, keeps
 
 FROM_TOOL = "given"
-"""Label of grasps that another tool made."""
 VARIED = "varied"
 """Label of rows that are made from a grasp and may hold or not."""
 NOT_TRIED = "not_tried"
 """Outcome of given grasps that cannot be simulated: their `note` says why, and no cell claims
 anything else about them."""
 UNIT_TOLERANCE = 1e-9
-"""Largest difference between a normal's length and one."""
 ROUNDOFF = 1e-6
 """Share of any number that processors may round differently."""
 CLAIMS = (
@@ -54,13 +52,11 @@ CLAIMS = (
 )  # fmt: skip
 """Cells that only executed grasps have."""
 IN_OWN_COLUMNS = ("load_multiple", "payload_kg", "predicted_first_slip", "simulated_first_slip")
-"""Figures of executions that have columns of their own."""
 ByFinger: TypeAlias = Annotated[Array, Shape(None, 3, nan=True)]
 """A vector for each finger, (k, 3); tables have four, null after the last."""
 FourLengths: TypeAlias = Annotated[Array, Shape(FINGERS, nan=True)]
 Four: TypeAlias = Annotated[Indices, Shape(FINGERS, whole=True)]
 Joints: TypeAlias = Annotated[Array, Shape("hand")]
-"""An angle for each joint of the hand."""
 FourPoints: TypeAlias = Annotated[Array, Shape(FINGERS, 3)]
 
 
@@ -270,7 +266,6 @@ class GraspRow(Declared):
         self._check_pose()
 
     def _check_execution(self) -> None:
-        """Refuse results of an execution that was not simulated; without a squeeze all is lost."""
         claims = [name for name in CLAIMS if getattr(self, name) is not None]
         lost = claims == ["survived"] and not self.survived and self.execution_note
         control = self.executed and self.control_of is not None
@@ -280,7 +275,6 @@ class GraspRow(Declared):
             raise InputError("an executed row must have its squeeze, its mass and what it carries")
 
     def _check_pose(self) -> None:
-        """Refuse a hand that is reached without a pose, or not reached without a reason."""
         if self.hand_reached is not None and self.hand_reached == bool(self.hand_reason):
             raise InputError(
                 f"hand_reason is {self.hand_reason!r}, but hand_reached is {self.hand_reached}"
@@ -353,7 +347,6 @@ class ExecutionRow(Declared):
 ROW_CLASSES: Mapping[Name, type[Any]] = {
     "objects": ObjectRow, "grasps": GraspRow, "trials": TrialRow, "executions": ExecutionRow,
 }  # fmt: skip
-"""The class of each table's rows."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -36,7 +36,6 @@ def build_dataset(command: dataset_flags.BuildFlags, reporter: Reporter) -> int:
 
 
 def _configuration(command: dataset_flags.BuildFlags) -> DatasetConfig:
-    """Read the settings of a dataset from flags, or from the file that is given in their place."""
     first = Path(command.objects[0]) if command.objects else Path()
     if first.suffix != ".toml":
         learning = None if command.learning == Learning() else command.learning

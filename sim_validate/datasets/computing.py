@@ -31,11 +31,9 @@ from sim_validate.datasets.work_units import WorkerError, WorkUnit, body_of, pro
 from sim_validate.processes.interrupts import check_interrupted
 
 Engine: TypeAlias = Processes | Cluster
-"""What computes units of work: processes of this machine, or a Ray or Dask cluster."""
 UNITS_AHEAD = 3
 """Number of units submitted per worker process, so that no worker waits for the next unit."""
 INTERRUPT_LOOK_S = 1.0
-"""Time between two checks for an interrupt [s]."""
 
 
 DoUnit: TypeAlias = Callable[[WorkUnit, Staging], None]
@@ -90,7 +88,6 @@ def do_task(task: UnitJob) -> None:
 
 @contextmanager
 def _ending_after(timeout_s: float | None) -> Generator[None]:
-    """End this process, whatever it does, when the block takes longer [s]."""
     if timeout_s is None:
         yield
         return

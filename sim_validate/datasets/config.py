@@ -57,7 +57,6 @@ LEARNING = "learning"
 """Names of the tables in a settings file."""
 BuiltInHand: TypeAlias = Literal["", "allegro", "allegro-urdf", "leap"]
 FigureGroup: TypeAlias = Literal["closure", "least_squeeze", "placement"]
-"""A group of figures that each grasp has on request."""
 CONTROL_KINDS = 5
 """Number of kinds of synthetic negative controls that a grasp has at most."""
 CREDITS = ("title", "license", "creator", "url", "published")
@@ -228,7 +227,6 @@ def config_from_toml(path: Path) -> DatasetConfig:
 
 
 def _is_date(text: str) -> bool:
-    """Tell whether a text is a day as YYYY-MM-DD, the form that all readers know."""
     try:
         return date.fromisoformat(text).isoformat() == text
     except ValueError:

@@ -207,7 +207,6 @@ VARIED_RATIOS = {
 """Least and largest ratio of a varied friction or mass to the one at which the verdict changes.
 Between them every logarithm of a ratio is as likely."""
 VARIED_DIGITS = 4
-"""Significant digits of a varied friction or mass, which tables then show as they are."""
 MOVE_TRIES = 32
 """Number of random ways in which a contact is moved until it stays on its face."""
 PAST = (0.05, 1.0)
@@ -312,7 +311,6 @@ def _past(
 def _decided(
     kind: str, number: int, at: Seated, friction: float, moved: RowCells
 ) -> Iterator[Variant]:
-    """Yield a variant with its proof, unless rounding does not let closure be decided."""
     name = f"{kind}-{number}"
     try:
         proved = grasp_of(at, friction, name)

@@ -38,7 +38,6 @@ from sim_validate.engine.traces import Outcome
 from sim_validate.processes.own_faults import OWN_FAULTS
 
 PLANNED_KIND = "planned"
-"""Kind of the grasps that were planned for their friction."""
 
 
 def split_of(object_id: str, seed: int) -> SplitName:
@@ -67,8 +66,6 @@ def _object_row(body: Polyhedron, unit: WorkUnit) -> ObjectRow:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Tried:
-    """Contacts with their trials and their execution."""
-
     body: Polyhedron
     contacts: Sequence[Contact]
     proved: Grasp | ClosureCertificate
@@ -171,7 +168,6 @@ class Making:
                 self._note(tuple(map(Contact, given.points, given.normals)), error, cells)
 
     def _note(self, contacts: Sequence[Contact], error: Exception, cells: RowCells) -> None:
-        """Add the row of contacts that cannot be simulated, with the reason."""
         self.grasps.append(GraspRow(**self._about(contacts), **cells, note=str(error)))
 
     def _judge(self, given: GraspToJudge, cells: RowCells) -> None:
@@ -187,7 +183,6 @@ class Making:
             self._add(tried, **cells, moved_m=at.moved_m)
 
     def _try(self, grasp: Grasp, body: Polyhedron, **cells: Any) -> None:
-        """Simulate a grasp and what is varied of it, and add all rows."""
         config, friction, name = self.config, self.unit.friction, cells["grasp_id"]
         asked, seed = config.asked, config.seed
         verdict = learning.validated_with(body, grasp, friction, self.agenda, asked.synthetic)
@@ -230,7 +225,6 @@ class Making:
         return _Tried(at.body, at.contacts, proved, verdict, executed)
 
     def _about(self, contacts: Sequence[Contact]) -> RowCells:
-        """Return the cells that are known of any contacts."""
         return {
             "object_id": self.body.content_sha256,
             "split": split_of(self.body.content_sha256, self.config.seed),
@@ -247,11 +241,9 @@ class Making:
         return proved.faces if planar and isinstance(proved, Grasp) else None
 
     def _name(self, grasp: str) -> str:
-        """Return the name of a grasp, which no other grasp of the dataset has."""
         return id_beginning(self.body.content_sha256, self.unit.friction) + grasp
 
     def _add(self, tried: _Tried, **cells: Any) -> None:
-        """Add the rows of contacts, of their trials, and of the negative controls made of them."""
         body, verdict, proved = tried.body, tried.verdict, tried.proved
         cells = {**self._about(tried.contacts), **cells, **tried.cells}
         if isinstance(proved, Grasp):

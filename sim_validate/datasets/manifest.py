@@ -173,7 +173,6 @@ def left_out_from(text: str) -> list[LeftOut]:
 
 
 LONGEST = 500
-"""Largest number of characters of a path in a file."""
 
 
 def require_inside(name: object, field: str) -> str:

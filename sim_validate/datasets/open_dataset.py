@@ -38,7 +38,7 @@ from sim_validate.datasets.config import (
     config_from_toml,
 )
 from sim_validate.datasets.manifest import Manifest, path_inside, read_manifest
-from sim_validate.datasets.parquet import Columns, Tables, each_batch, read_columns
+from sim_validate.datasets.parquet import Columns, each_batch, read_columns
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.planning.asked_objects import NAMES_LISTED, some
 
@@ -52,11 +52,6 @@ class Dataset:
     folder: Path
     manifest: Manifest
     split: str | None = None
-
-    @property
-    def tables(self) -> Tables:
-        """Tables of the dataset, with their columns."""
-        return self.manifest.tables
 
     @cached_property
     def config(self) -> DatasetConfig:
@@ -79,7 +74,9 @@ class Dataset:
         name: Name = next(name for name, each in ROW_CLASSES.items() if each is kind)
         for each in self.manifest.of_table(name, self.split):
             found = 0
-            for batch in each_batch(path_inside(self.folder, each.path), name, self.tables):
+            for batch in each_batch(
+                path_inside(self.folder, each.path), name, self.manifest.tables
+            ):
                 for number, row in enumerate(batch.to_pylist(), start=found):
                     if cells == {column: row[column] for column in cells}:
                         yield from_record(kind, row, f"{each.path}: row {number}")
@@ -92,7 +89,7 @@ class Dataset:
 
     def by_object(self) -> Iterator[DatasetRows]:
         """Yield the rows of each object in turn."""
-        streams = map(self._begun, self.tables)
+        streams = map(self._begun, self.manifest.tables)
         for _, same in groupby(merge(*streams, key=itemgetter(0)), key=itemgetter(0)):
             rows: dict[Name, list[Any]] = {}
             for _, name, row in same:
@@ -171,7 +168,8 @@ def load_dataset(folder: str | Path, split: str | None = None) -> dict[Name, Col
             "by object as docs/datasets.md shows",
             stacklevel=2,
         )
-    return {name: read_columns(chosen.paths(name), name, chosen.tables) for name in chosen.tables}
+    tables = chosen.manifest.tables
+    return {name: read_columns(chosen.paths(name), name, tables) for name in tables}
 
 
 FOLDER = "meshes"

@@ -38,7 +38,6 @@ from sim_validate.datasets.config import KEYS, Name
 
 CellKind: TypeAlias = Literal["text", "bool", "int", "float"]
 RowCells: TypeAlias = Mapping[str, Any]
-"""The cells of a row as plain values, by column."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,9 +72,7 @@ class TableColumn:
 
 
 Tables: TypeAlias = Mapping[Name, tuple[TableColumn, ...]]
-"""The tables of a dataset, with their columns."""
 Form: TypeAlias = tuple[CellKind, tuple[int, ...]]
-"""Type and shape of a column's cells."""
 
 
 def columns_of(kind: type, groups: Mapping[str, int]) -> tuple[TableColumn, ...]:
@@ -144,7 +141,6 @@ def in_columns(kind: type, told: tuple[str, ...], beginning: str = "") -> Iterat
 
 
 def _plain(value: Any) -> Any:
-    """Return a number as a cell: null for one that is not finite."""
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
@@ -219,7 +215,6 @@ def parquet_bytes(name: Name, rows: Sequence[RowCells], tables: Tables) -> bytes
 
 
 def _in_order(table: Any, name: Name) -> Any:
-    """Return a table sorted by its keys, which no two rows may share."""
     keys = list(KEYS[name])
     if table.group_by(keys).aggregate([]).num_rows < table.num_rows:
         raise InputError(
@@ -272,7 +267,6 @@ def _opened(path: Path, name: Name, tables: Tables) -> Generator[Any]:
 
 
 def _check_size(path: Path, claimed: Any) -> None:
-    """Refuse a file that would not fit into memory, before anything is read."""
     groups = [claimed.row_group(i) for i in range(claimed.num_row_groups)]
     rows, largest = claimed.num_rows, max((each.total_byte_size for each in groups), default=0)
     if not 0 <= rows <= MOST_FILE_ROWS or not 0 <= largest <= MOST_GROUP_BYTES:
@@ -348,7 +342,6 @@ def write_files(
 
 
 def _groups(parts: Iterable[Any], about: Mapping[str, str]) -> Iterator[Any]:
-    """Yield the rows of tables in groups that are large enough, but for the last."""
     waiting = list[Any]()
     for part in parts:
         waiting += [part.replace_schema_metadata(about)] if part.num_rows else []
@@ -360,7 +353,6 @@ def _groups(parts: Iterable[Any], about: Mapping[str, str]) -> Iterator[Any]:
 
 
 def _write_file(path: Path, groups: Iterable[Any], schema: Any) -> int:
-    """Write groups of rows until the file is full, and return the number of rows."""
     rows = 0
     writer = pyarrow().parquet.ParquetWriter
     with path.open("wb") as stream, writer(stream, schema, **PARQUET_OPTIONS) as to:

@@ -27,7 +27,6 @@ from sim_validate.files.output_folders import whole_folder
 
 HASH = re.compile(r"[0-9a-f]{64}")
 OTHER_FILES = "others"
-"""Subfolder for those files of a unit that are not tables."""
 
 
 @declared

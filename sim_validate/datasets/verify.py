@@ -69,7 +69,6 @@ from sim_validate.execution.verdict import ExecutionTrial, may_slip
 from sim_validate.files.locks import LOCK
 
 MOST_UNIT_FAULTS = 20
-"""Largest number of faults that are listed for one object at one friction."""
 
 
 def verify(folder: Path, share: float = 0.0, seed: int = 0) -> list[str]:
@@ -97,14 +96,12 @@ def verify(folder: Path, share: float = 0.0, seed: int = 0) -> list[str]:
 
 
 def _parts(dataset: Dataset) -> Iterator[tuple[Dataset, DatasetRows]]:
-    """Yield the rows of each object, with the split whose files they are in."""
     for split, _ in SPLITS:
         part = replace(dataset, split=split)
         yield from ((part, rows) for rows in part.by_object())
 
 
 def _file_faults(dataset: Dataset) -> Iterator[str]:
-    """Yield sentences on files that are not as the manifest lists them, or that it does not."""
     folder, files = dataset.folder, dataset.manifest.files
     there = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
     more = there - {MANIFEST, LOCK, *(each.path for each in files)}
@@ -152,8 +149,6 @@ def _sample_faults(dataset: Dataset, share: float, seed: int) -> Iterator[str]:
 
 
 class _Redoing:
-    """Computes parts of a dataset again."""
-
     def __init__(self, dataset: Dataset) -> None:
         self._dataset, self._config, manifest = dataset, dataset.config, dataset.manifest
         same = (dict(provenance()), arithmetic())
@@ -201,7 +196,7 @@ class _Redoing:
         if not self._exact:
             yield from _loose_differences(stored, made.rows)
             return
-        for table, columns in self._dataset.tables.items():
+        for table, columns in self._dataset.manifest.tables.items():
             before, after = (rows.cells(table, columns) for rows in (stored, made.rows))
             yield from _differences(table, before, after)
         for path, text in made.files.items():
@@ -275,7 +270,6 @@ RATIO_TOLERANCE = 1e-3
 NAMING_COLUMNS: Mapping[tuple[Name, str], tuple[Name, str]] = {
     **REFERENCES, ("grasps", "control_of"): ("grasps", "grasp_id"),
 }  # fmt: skip
-"""Columns that name a row of another table or, where they are not null, of their own."""
 LABELS = {"grasp": PLANNED_KIND, FROM_TOOL: FROM_TOOL}
 """Kind of the rows of a label; other labels but `varied` are kinds themselves."""
 UNBALANCED = 1e-9
@@ -298,8 +292,6 @@ def _disagreements(row: GraspRow, wanted: Mapping[str, Any], source: str) -> Ite
 
 
 class _Checking:
-    """Checks the rows of one object, and its mesh."""
-
     def __init__(self, part: Dataset, rows: DatasetRows) -> None:
         self.part, self.config, self.rows = part, part.config, rows
         self.by_name = {row.grasp_id: row for row in rows.grasps}
@@ -427,7 +419,6 @@ class _Checking:
                 yield f"the ratio {ratio} is none of the kind {row.kind}"
 
     def _trials(self, row: GraspRow) -> Iterator[str]:
-        """Check that a row agrees with its trials, and has none if it was not executed."""
         trials = self.executions[row.grasp_id]
         if not row.executed:
             if trials:
@@ -442,7 +433,6 @@ class _Checking:
         yield from _disagreements(row, wanted, "the table of executions")
 
     def _squeezes(self, row: GraspRow, body: Polyhedron) -> Iterator[str]:
-        """Check the mass, and prove again that the squeezes carry what the row says."""
         yield from self._proved(row, body, "load_multiple")
         if row.least_squeeze_n is not None:
             # it carries the weight itself, with no larger push
@@ -452,7 +442,6 @@ class _Checking:
     def _proved(
         self, row: GraspRow, body: Polyhedron, claim: str, push_n: float | None = None
     ) -> Iterator[str]:
-        """Check that a squeeze carries a multiple of the weight, with pushes that are allowed."""
         asked, load, mass_kg = self.config.execution, row.load_multiple, row.mass_kg
         if asked is None or row.squeeze_n is None or load is None or mass_kg is None:
             return  # nothing was executed
@@ -492,7 +481,6 @@ def _on_surface(surface: SolidSurface, row: GraspRow, radius_m: float) -> Iterat
 
 
 def _contact_faults(row: GraspRow) -> Iterator[str]:
-    """Compute the closure of a contact set from the contacts alone."""
     try:
         found = force_closure(row.points, row.normals, row.friction)
     except UndecidedError as error:
@@ -517,7 +505,6 @@ def _witness_faults(row: GraspRow, forces: Array, body: Polyhedron) -> Iterator[
 
 
 def _hand_faults(row: GraspRow, hand: Hand, body: Polyhedron) -> Iterator[str]:
-    """Check a pose by itself, with what it must keep to."""
     if bool(row.force_closed) != (row.hand_reached is not None):
         yield f"hand_reached is {row.hand_reached}, but force_closed is {row.force_closed}"
     joints, pose, fingers = row.hand_joints_rad, row.T_object_palm_m, row.hand_fingers

@@ -38,11 +38,9 @@ TWIN = "the same object as"
 GIVEN_CONTACTS = "contacts.json"
 """Name of the file with the given contacts, if there are any; its normals point into the object."""
 EXTRAS = ("meshes", "scenes")
-"""Folders of the files that units make besides their rows."""
 
 
 Finished: TypeAlias = tuple[WorkUnit, UnitRecord]
-"""A unit of work that has rows, with its record."""
 
 
 def write_rows(

@@ -18,14 +18,12 @@ from grasp_core.files.json_text import shown
 from grasp_core.files.text_files import read_bytes, write_parts
 
 MOST_ARRAY_BYTES = 256 * 2**20
-"""Largest total size of the arrays in a file."""
 MOST_MEMBERS = 256
 MOST_HEADER = 10_000
 """Largest number of characters in an array's header, a limit of numpy's."""
 ARRAY_KINDS = "biuf"
 """Kinds of arrays that are read: truth values and numbers."""
 ZIP_MAGIC, MEMBER_ENDING = b"PK\x03\x04", ".npy"
-"""First bytes of a zip archive, and ending of the array names inside it."""
 
 
 def read_arrays(path: Path, names: Collection[str]) -> dict[str, NDArray[Any]]:

@@ -10,7 +10,6 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 LOCK = ".graspproof.lock"
-"""Name of the file in a folder that a command writes to."""
 WITHOUT_LOCKS = frozenset({errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP, errno.EINVAL})
 """Errors of file systems that have no locks: their users take care that commands do not meet."""
 

@@ -36,7 +36,6 @@ OF_REPORT = (
     INDEX, *STATIC, "object-*.js", f"{GRASP_PAGES}/*.html", f"{PICTURE_FOLDER}/*.svg",
     f"{CLIP_FOLDER}/*.webp",
 )  # fmt: skip
-"""Patterns of the files of a report, the first page first."""
 PAGE_FOLDERS = ("", GRASP_PAGES, PICTURE_FOLDER, CLIP_FOLDER)
 RESULT_FOLDERS = (
     "scenes",
@@ -45,7 +44,6 @@ RESULT_FOLDERS = (
     *PAGE_FOLDERS,
     *(f"{REPORT}/{part}" for part in PAGE_FOLDERS),
 )
-"""Subfolders into which commands write."""
 
 
 def remove_results(folder: Path, file: str = GRASPS) -> None:

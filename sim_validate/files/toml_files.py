@@ -11,9 +11,7 @@ from grasp_core.files.text_files import read_text
 from grasp_core.messages import at
 
 MOST_LETTERS = 2**20
-"""Largest number of characters of a settings file, which is usually short."""
 MOST_SAID = 200
-"""Largest number of characters of what the parser says of a text."""
 QUOTED_OR_COMMENT = re.compile(
     r'''"""(?:[^\\]|\\.)*?(?:"""|\\?\Z)|"(?:[^"\\\n]|\\.)*(?:"|\n|\\?\Z)|'''
     r"""'''.*?(?:'''|\Z)|'[^'\n]*(?:'|\n|\Z)|\#[^\n]*""",
@@ -21,7 +19,6 @@ QUOTED_OR_COMMENT = re.compile(
 )
 """Pattern of quoted text and comments, in which dots are no key separators."""
 MOST_KEY_PARTS = 64
-"""Largest number of parts of a key."""
 LONG_KEY = re.compile(rf"(?<![\w-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{MOST_KEY_PARTS}}}")
 """Pattern of a key `a.b.c` with too many parts. The time of tomllib grows with the cube of their
 number: two minutes for a hundred kilobytes."""
@@ -55,7 +52,6 @@ def tables_of_toml(text: str) -> dict[str, Any]:
 
 
 def _check_no_dates(found: Any, where: str = "") -> None:
-    """Refuse days and times of TOML, which no setting is."""
     if isinstance(found, date | time):
         raise InputError(f"{where}: expected a number or text, got {found}; put it in quotes")
     if isinstance(found, dict):

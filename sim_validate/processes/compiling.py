@@ -84,14 +84,11 @@ PLANNING = Loops(
                 np.full((1, 4), SPOT_FRICTION)),
     ),
 )  # fmt: skip
-"""What compiles the loops that plans need."""
 REACHING = Loops(("hands.collisions", "hands.pose"), (_hand_reach,))
-"""What compiles the loops that put hands to contacts."""
 EVERYTHING = Loops(
     (*PLANNING.kernels, *REACHING.kernels, "regions.cover", "optimizing.search"),
     (*PLANNING.calls, _best, *REACHING.calls, _regions, _clearance),
 )
-"""What compiles all loops that there are."""
 
 
 def must_compile(loops: Loops, jobs: int) -> bool:

@@ -8,7 +8,7 @@ program would run on: interrupts are noted, and raised again at the next step. A
 import signal
 import sys
 import threading
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from types import FrameType
 
@@ -20,26 +20,39 @@ _noted = threading.Event()
 
 
 @contextmanager
-def interrupts_noted() -> Generator[None, None, None]:
+def interrupts_noted() -> Generator[None]:
     """Record interrupts, besides raising them, while the context is open."""
     if threading.current_thread() is not threading.main_thread():
         yield  # Python handles signals in its main thread only
         return
     _noted.clear()
-    before = {number: signal.signal(number, _note) for number in SIGNALS}
     told = sys.unraisablehook
     # reports errors that cannot be raised where they occur, but interrupts, which are recorded
     sys.unraisablehook = lambda e: None if e.exc_type is KeyboardInterrupt else told(e)
     try:
-        yield
+        with _handled_by(_note):
+            yield
     except Exception as error:
         if _noted.is_set():
             raise KeyboardInterrupt from error
         raise
     finally:
         sys.unraisablehook = told
-        for number, handler in before.items():
-            signal.signal(number, handler)
+
+
+@contextmanager
+def _handled_by(handler: Callable[[int, FrameType | None], None]) -> Generator[Callable[[], None]]:
+    """Have interrupts handled until the end of the block, or until what is yielded is called."""
+    before = {number: signal.signal(number, handler) for number in SIGNALS}
+
+    def restore() -> None:
+        for number, earlier in before.items():
+            signal.signal(number, earlier)
+
+    try:
+        yield restore
+    finally:
+        restore()
 
 
 def _note(_: int, __: FrameType | None) -> None:
@@ -48,25 +61,18 @@ def _note(_: int, __: FrameType | None) -> None:
 
 
 @contextmanager
-def interrupts_end(stop: Stop) -> Generator[None, None, None]:
+def interrupts_end(stop: Stop) -> Generator[None]:
     """Have the first interrupt end work in order, with what is done; the next one is raised."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = {number: signal.getsignal(number) for number in SIGNALS}
 
-    def note(_: int, __: FrameType | None) -> None:
+    def end(_: int, __: FrameType | None) -> None:
         stop.now()
-        for number, handler in before.items():
-            signal.signal(number, handler)
+        restore()
 
-    for number in before:
-        signal.signal(number, note)
-    try:
+    with _handled_by(end) as restore:
         yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 def check_interrupted() -> None:

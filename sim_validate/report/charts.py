@@ -68,7 +68,6 @@ LONGITUDES, LATITUDES = 21, 11
 """Numbers of a map's nodes: around, where the first is also the last, and from pole to pole."""
 CHART_WIDTH, CHART_HEIGHT = 440.0, 300.0
 SCALE_MARGIN = 12.0
-"""Width of the margins beside the scale of colours [pixels]."""
 MIDDLE, MAP_HALF = np.array([220.0, 130.0]), 100.0
 """Middle of a map on its panel, and half of its height [pixels]."""
 NUMBERS_APART = 0.15
@@ -76,7 +75,6 @@ NUMBERS_APART = 0.15
 NAME_GROUND = np.array([(-12.0, -8.0), (12.0, -8.0), (12.0, 8.0), (-12.0, 8.0)])
 """Ground of the name of a direction, around its middle [pixels]."""
 LABEL = 18.0
-"""Distance from the circle of the least value within which a label gives way [pixels]."""
 MAP_ROWS = 60
 """Height of the image of a map [its own pixels]; the map is twice as wide."""
 USUAL_PUSH_N = FingerSettings().max_normal_force_n
@@ -87,17 +85,13 @@ MAP_DIRECTIONS = {
     "-x": (172.0, 0.0),
 }  # fmt: skip
 SHADOW_SIZE = 300.0, 338.0
-"""Width and height of a panel [pixels]."""
 PLACE = (62.0, 28.0, 224.0)
 """Left and upper border of the square in which a panel draws, and its side [pixels]."""
 AROUND = 0.55
 """Half of the range of an axis, relative to the extent of what is drawn."""
 HATCHES = 7
-"""Number of lines that hatch the disc."""
 CROSS = (((-1.0, 0.0), (1.0, 0.0)), ((0.0, -1.0), (0.0, 1.0)))
-"""The lines of the cross at zero."""
 SHADOW_ENDS = 181
-"""Number of points on the border of a shadow; the first is also the last."""
 LEAST_DIVISOR = np.finfo(np.float64).tiny
 """Least number that is divided by: the smallest of full precision."""
 
@@ -201,7 +195,6 @@ def _map(values: Array, kind: str, unit: str) -> Sheet:
 
 
 def _scale(low: float, high: float) -> Iterator[Mark]:
-    """Draw the colours of a map from its least to its largest value, and what its circle marks."""
     top, long = MIDDLE[1] + MAP_HALF + 12.0, CHART_WIDTH - 2.0 * SCALE_MARGIN
     yield Image(SCALE_MARGIN, top, long, 10.0, np.arange(LEVELS)[None])
     ends = f"{low:.3g}", f"{high:.3g}"
@@ -354,12 +347,10 @@ def _hatched(panel: Panel, radius: float) -> list[Mark]:
 
 
 MOTION_SIZE = 300.0, 316.0
-"""Width and height of a panel of motion [pixels]."""
 TIME = "time since friction was lowered [s]"
 MOTION_PLACE = (50.0, 28.0, 236.0, 180.0)
 """Left and upper border of what a panel draws in, its width and its height [pixels]."""
 KEY = 3.0 * ROW + 6.0
-"""Height of the key below a panel [pixels]."""
 SLIP_NAME = (1.0, "slips")
 """Share of its friction that a finger uses when it slips, and its name."""
 MOST_SHARE = 1.15

@@ -25,6 +25,7 @@ from scenes.drawing.clips import GraphicsError, has_display, write_clip, write_t
 from scenes.drawing.pages import turntable_page
 from scenes.drawing.pictures import Drawing
 from scenes.mujoco.closure_scene import Scene, build_scene, write_scene
+from scenes.mujoco.mjcf_text import IDENTITY_POSE
 from scenes.settings import FingerSettings
 from sim_validate.closure.replaying import Recorded, Replayed, WantedTrial, recorded_in, replayed
 from sim_validate.commands import flags
@@ -116,8 +117,7 @@ def closing(scene: Scene) -> Array:
     away = np.einsum("kij,ki->kj", layout.frames, layout.approach).ravel()
     left = np.linspace(1.0, 0.0, COMING) ** 2
     slides = np.vstack([left[:, None] * away, np.zeros((FRAMES_RESTING, len(away)))])
-    home = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
-    return np.column_stack([np.tile(home, (len(slides), 1)), slides])
+    return np.column_stack([np.tile(IDENTITY_POSE, (len(slides), 1)), slides])
 
 
 def report_folder(command: flags.ReportFlags, reporter: Reporter) -> int:
@@ -155,7 +155,6 @@ def shown_report(asked: flags.ReportFlags, reporter: Reporter) -> Report:
 
 
 SHOWN_ROWS = 12
-"""Number of rows of the motion that are shown; the trace file has all of them."""
 
 
 def replay_trial(command: flags.ReplayFlags, reporter: Reporter) -> int:

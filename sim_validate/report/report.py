@@ -71,12 +71,9 @@ SPAN = (
     "positively spans space; 0: none do, and the force cones lean"
 )
 TRIAL_FIGURES = tuple(each for each in figures(WrenchVerdict) if each.name != "outcome")
-"""Figures of a trial in the columns behind its outcome."""
 TITLE_FIGURES = ("id", "outcome", "predicted_critical_friction", "simulated_critical_friction")
-"""Figures of a verdict that the page says in other places."""
 FOCUS_MEANING = "where lines of force meet, in the object's frame"
 POSSIBLE_ROWS = 20
-"""Largest number of grasps in the table of what is possible."""
 FIRST_CARDS = 4
 """Number of cards that are drawn before the first page is written for the first time; it is written
 again whenever twice as many are drawn, and at the end."""
@@ -347,7 +344,6 @@ def index_page(runs: Sequence[RunFolder], shown: Sequence[Card], waiting: int = 
 
 
 def _judged(runs: Sequence[RunFolder]) -> TemplateData | None:
-    """Return a table of how many grasps each published test accepts, for each object."""
     judged = [(run.saved.body.name, run.judgements) for run in runs if run.judgements is not None]
     totals = [(name, each) for name, found in judged for each in found.summary.values()]
     columns, rows = table([each for _, each in totals], Totals)
@@ -422,7 +418,6 @@ def _about(run: RunFolder) -> Iterable[tuple[str, str]]:
 
 
 def _lines(tables: Mapping[str, Any], where: str = "") -> Iterator[tuple[str, str]]:
-    """Yield each setting in tables inside each other with its place."""
     for name, value in tables.items():
         if isinstance(value, dict):
             yield from _lines(cast("Mapping[str, Any]", value), f"{where}{name}.")

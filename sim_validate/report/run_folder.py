@@ -82,7 +82,6 @@ class RunFolder:
 
 
 def _about(results: ById[Item] | None, grasp: Grasp) -> Item | None:
-    """Return what a file of results has about a grasp; None if it has nothing, or is missing."""
     return next((each for each in results or () if each.id == grasp.id), None)
 
 
@@ -221,7 +220,6 @@ def reaches_beside(folder: Path, saved: Plan) -> "Reaches | None":
 
 
 def _read(folder: Path, kind: type[File], saved: Plan) -> File | None:
-    """Read results about the grasps of a run, if there are any."""
     path = folder / kind.FILE
     if not path.is_file():
         return None

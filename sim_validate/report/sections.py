@@ -38,19 +38,16 @@ if TYPE_CHECKING:
     from sim_validate.hands.reaches import ReachedGrasp, Reaches
 
 TemplateData: TypeAlias = Mapping[str, Any]
-"""What a template fills in, by name."""
 REASONS = {
     "collision": "a collision",
     "limit": "a joint's limit",
     "not found": "no pose found",
     "no closure": "no three contacts close",
 }
-"""Words for what was in the way."""
 EXECUTION_FIGURES: Sequence[Figure] = figures(ExecutedGrasp)[1:]
 """Figures of executed grasps, but for the id, which leads to a grasp's page."""
 FINGERS_MEANING = "that touch at the grasp's contacts, by finger of the grasp"
 HAND_TITLE_FIGURES = ("grasp", "id")
-"""Figures that the page has in its title."""
 ALWAYS = ("mass_kg", "seed")
 """Settings of executions whose usual value depends on the object or on the plan."""
 
@@ -227,7 +224,6 @@ def execute_command(executions: Executions, path: str, grasp_id: str) -> str:
 
 
 def _changed(settings: Any, usual: Any, always: Sequence[str] = ()) -> TemplateData:
-    """Return the settings that are not the usual ones, and some others."""
     return {name: value for name, value in asdict(settings).items()
             if name in always or value != getattr(usual, name)}  # fmt: skip
 

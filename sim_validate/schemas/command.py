@@ -2,8 +2,8 @@
 
 from sim_validate.commands.console import Reporter
 from sim_validate.commands.exit_codes import Exit
+from sim_validate.commands.flags import SchemaFlags
 from sim_validate.schemas.file_schemas import FILE_KINDS, named, schema_text
-from sim_validate.schemas.flags import SchemaFlags
 
 
 def show_schema(command: SchemaFlags, reporter: Reporter) -> int:

@@ -18,23 +18,7 @@ from tyro.conf import Positional
 
 from grasp_core.errors import InputError
 from grasp_core.figures import meanings, unit_of
-from grasp_core.files.file_kinds import (
-    ANALYSES,
-    BASELINE,
-    BEST,
-    CONTACTS_FILE,
-    EXECUTIONS,
-    GRASPS,
-    JUDGEMENTS,
-    MANIFEST,
-    QUARANTINE,
-    REACHES,
-    REGIONS,
-    TRANSFER,
-    UNIT,
-    VERDICTS,
-    WRENCH_FILE,
-)
+from grasp_core.files import file_kinds as files
 from grasp_core.files.records import entries
 from grasp_core.kinds import adapter, rules
 from grasp_core.messages import near, shown
@@ -47,7 +31,6 @@ REPOSITORY = "https://example.org/graspproof"
 """Address of the repository, which .github/workflows/release.yml puts here."""
 DRAFT = "https://json-schema.org/draft/2020-12/schema"
 IN_FILES = re.compile(r"\b(None|NaN)\b")
-"""What JSON lacks: files have null there."""
 
 
 class FileKind(NamedTuple):
@@ -60,22 +43,22 @@ class FileKind(NamedTuple):
 
 
 FILE_KINDS: Mapping[str, FileKind] = {
-    "grasps": FileKind(GRASPS, "grasp_core.records.grasps_json:GraspsFile"),
-    "best": FileKind(BEST, "sim_validate.planning.best:Best"),
-    "transfer": FileKind(TRANSFER, "sim_validate.planning.transfer:TransferFile"),
-    "verdicts": FileKind(VERDICTS, "sim_validate.closure.verdict:Verdicts"),
-    "executions": FileKind(EXECUTIONS, "sim_validate.execution.verdict:Executions"),
-    "judgements": FileKind(JUDGEMENTS, "sim_validate.protocols.verdict:Judgements"),
-    "regions": FileKind(REGIONS, "sim_validate.planning.regions:Regions"),
-    "reaches": FileKind(REACHES, "sim_validate.hands.reaches:Reaches"),
-    "manifest": FileKind(MANIFEST, "sim_validate.datasets.manifest:Manifest"),
-    "unit": FileKind(UNIT, "sim_validate.datasets.resuming:UnitRecord"),
-    "quarantine": FileKind(f"line of {QUARANTINE}",
+    "grasps": FileKind(files.GRASPS, "grasp_core.records.grasps_json:GraspsFile"),
+    "best": FileKind(files.BEST, "sim_validate.planning.best:Best"),
+    "transfer": FileKind(files.TRANSFER, "sim_validate.planning.transfer:TransferFile"),
+    "verdicts": FileKind(files.VERDICTS, "sim_validate.closure.verdict:Verdicts"),
+    "executions": FileKind(files.EXECUTIONS, "sim_validate.execution.verdict:Executions"),
+    "judgements": FileKind(files.JUDGEMENTS, "sim_validate.protocols.verdict:Judgements"),
+    "regions": FileKind(files.REGIONS, "sim_validate.planning.regions:Regions"),
+    "reaches": FileKind(files.REACHES, "sim_validate.hands.reaches:Reaches"),
+    "manifest": FileKind(files.MANIFEST, "sim_validate.datasets.manifest:Manifest"),
+    "unit": FileKind(files.UNIT, "sim_validate.datasets.resuming:UnitRecord"),
+    "quarantine": FileKind(f"line of {files.QUARANTINE}",
                            "sim_validate.datasets.manifest:LeftOut"),
-    "baseline": FileKind(BASELINE, "sim_validate.baselines.baseline:Baseline"),
-    "analyses": FileKind(ANALYSES, "sim_validate.planning.analyze:Analyses"),
-    "wrenches": FileKind(WRENCH_FILE, "sim_validate.engine.setup:WrenchFile"),
-    "contacts": FileKind(CONTACTS_FILE, "grasp_core.records.grasps_json:ContactsFile"),
+    "baseline": FileKind(files.BASELINE, "sim_validate.baselines.baseline:Baseline"),
+    "analyses": FileKind(files.ANALYSES, "sim_validate.planning.analyze:Analyses"),
+    "wrenches": FileKind(files.WRENCH_FILE, "sim_validate.engine.setup:WrenchFile"),
+    "contacts": FileKind(files.CONTACTS_FILE, "grasp_core.records.grasps_json:ContactsFile"),
     "dataset": FileKind("configuration of a dataset, TOML",
                         "sim_validate.datasets.config:DatasetConfig", True),
     "setup": FileKind("setup of the simulation, TOML", "sim_validate.engine.setup:Setup", True),
@@ -205,12 +188,9 @@ class _OfFiles(GenerateJsonSchema):
 
 
 class _OfUsers(_OfFiles):
-    """Leaves out what users cannot set."""
-
     LEFT_OUT = CHOSEN
 
 
 def _about(kind: type, name: str, key: str) -> dict[str, str]:
-    """Return the meaning and the unit of a key, as far as it has them."""
     said = {"description": IN_FILES.sub("null", meanings(kind).get(name, "")), "unit": unit_of(key)}
     return {word: text for word, text in said.items() if text}

@@ -36,7 +36,9 @@ def rows_of(folder, name):
     """The cells of a table's rows, as its files hold them."""
     chosen = select(folder)
     paths = chosen.paths(name)
-    return [row for path in paths for row in read_table(path, name, chosen.tables).to_pylist()]
+    return [
+        row for path in paths for row in read_table(path, name, chosen.manifest.tables).to_pylist()
+    ]
 
 
 def build_small(folder, config=SMALL):

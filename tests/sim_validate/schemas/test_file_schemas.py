@@ -14,11 +14,11 @@ from grasp_core.files import file_kinds
 from grasp_core.records.grasps_json import ContactSet
 from sim_validate.baselines.suite import suite_from_tables
 from sim_validate.commands.console import Reporter
+from sim_validate.commands.flags import SchemaFlags
 from sim_validate.datasets.config import DatasetConfig, config_from_toml, config_to_toml
 from sim_validate.main import main
 from sim_validate.schemas.command import show_schema
 from sim_validate.schemas.file_schemas import DRAFT, FILE_KINDS, address, named, schema_of
-from sim_validate.schemas.flags import SchemaFlags
 from tests.bad_input.mesh_texts import obj
 from tests.damaged import damaged
 from tests.fuzzing.data_files import TARGETS

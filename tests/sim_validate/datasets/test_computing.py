@@ -1,12 +1,15 @@
 import dataclasses
 import errno
 import itertools
+import os
 import time
+from types import SimpleNamespace
 
 import pytest
 import trimesh
 
 from grasp_core.processes import local_processes
+from sim_validate.datasets import clusters
 from sim_validate.datasets import computing as workers
 from sim_validate.datasets.build import build
 from sim_validate.datasets.computing import UnitJob, compute_all, do_task, do_unit
@@ -137,3 +140,19 @@ def test_a_process_that_never_ends_is_ended(staging):
         given = task(staging, do_unit)
         engine.submit(do_task, given).result()
     assert staging.of(given.unit).is_dir()
+
+
+def test_settings_of_ray_are_set_while_it_runs_and_those_of_the_caller_stay(monkeypatch):
+    own, other, *_ = clusters.RAY_SETTINGS
+    monkeypatch.delenv(own, raising=False)
+    monkeypatch.setenv(other, "mine")
+    ray = SimpleNamespace(
+        init=lambda **_: None, cluster_resources=lambda: {"CPU": 3.0}, shutdown=lambda: None
+    )
+    monkeypatch.setattr(clusters, "_imported", lambda *_: ray)
+    before = dict(os.environ)
+    with clusters.ray_workers(2, None) as started:
+        assert started.workers == 3
+        assert os.environ[own] == clusters.RAY_SETTINGS[own]
+        assert os.environ[other] == "mine"
+    assert dict(os.environ) == before
