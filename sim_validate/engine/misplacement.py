@@ -34,11 +34,6 @@ MOST_ADVANCES = 100
 """Advances after which a ball stops: beside a surface that it nearly grazes they are tiny."""
 
 
-def draws_of_trial(seed: int, number: int) -> np.random.Generator:
-    """Return the generator of one repeated trial's noise."""
-    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(NOISE_STREAM, number)))
-
-
 def draws_by_name(seed: int, *names: object) -> np.random.Generator:
     """Return the generator of what is drawn under some names."""
     digest = hashlib.sha256(" ".join(map(str, (seed, *names))).encode()).digest()
@@ -91,7 +86,8 @@ def disturbed(
     body: Polyhedron, grasp: Grasp, friction: float, noise: Noise, seed: int, number: int
 ) -> Disturbed:
     """Disturb a grasp by the noise of one repeated trial."""
-    rng, center = draws_of_trial(seed, number), body.center_of_mass
+    rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(NOISE_STREAM, number)))
+    center = body.center_of_mass
     shift, turn = noise.shift * body.radius * rng.normal(size=3), rng.normal(size=3)
     slipperiness, heaviness = rng.normal(size=2)
     leaning = math.radians(noise.normal_deg) * rng.normal(size=(len(grasp.contacts), 2))

@@ -152,7 +152,6 @@ def resting(body: Polyhedron, tips: Array, radii: Array) -> Rest | None:
 
 AXIS_LETTERS = ("x", "y", "z")
 SIGNED_AXES = tuple((sign, axis) for axis in range(3) for sign in (1.0, -1.0))
-"""Sign and axis of the six directions of stops and knocks."""
 OF_NO_SIZE: dict[TrialKind, str] = {"shake": "shake_g", "knock": "knock_n_s"}
 """Setting whose zero leaves no trial of a kind."""
 
