@@ -144,7 +144,6 @@ def _command_of(words: Sequence[str]) -> str:
 
 
 def _list_commands(group: str, words: Sequence[str]) -> NoReturn:
-    """Have the parser list all commands, or those of a group, or say what it misses, and exit."""
     helps = {name: each.help for name, each in COMMANDS.items() if name.startswith(group)}
     if not group:
         helps = {name.split()[0]: GROUPS.get(name.split()[0], said) for name, said in helps.items()}

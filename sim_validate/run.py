@@ -94,7 +94,6 @@ def run_object(command: simulation_flags.RunFlags, reporter: Reporter) -> int:
 
 
 def _show_plan(body: Polyhedron, found: Plan, folder: Path, reporter: Reporter) -> int:
-    """Show what was planned; return the exit code of a plan that was ended early."""
     say_counts(body, found, reporter)
     code = say_ended(found, reporter)
     if found.absence:

@@ -220,7 +220,6 @@ def to_text(layout: Layout, physics: PhysicsSettings) -> str:
 
 
 def _pads(layout: Layout, bits: Sequence[int]) -> list[dict[str, Any]]:
-    """Return the pad that each fingertip touches, as its bits say."""
     width, depth = PAD_HALF_WIDTH * layout.radius_m, PAD_DEPTH * layout.radius_m
     size, pads = {"size": (width, width, 0.5 * depth)}, list[dict[str, Any]]()
     for point, frame, own in zip(layout.contacts, layout.frames, bits, strict=True):

@@ -30,9 +30,7 @@ IDENTITY_POSE = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 IDENTITY_POSE.setflags(write=False)
 FREE_JOINT = {"pos": ORIGIN, "limited": "false", "damping": 0.0, "stiffness": 0.0, "armature": 0.0,
         "frictionloss": 0.0}  # fmt: skip
-"""Attributes of a joint that moves freely."""
 TIP_LOOK = {"contype": 0, "conaffinity": 0, "mass": 0.0, "group": 0, "rgba": (0.8, 0.25, 0.2, 1.0)}
-"""Attributes of a fingertip that touches nothing."""
 
 
 def quaternion(rotation: Array) -> Array:
@@ -88,7 +86,6 @@ class Element:
 
 
 Parts: TypeAlias = Mapping[str, Element]
-"""The sections of a scene, by tag."""
 
 
 def element(tag: str, attributes: Mapping[str, object]) -> Element:

@@ -178,7 +178,6 @@ class TestedObject:
         return Postures(np.tile(palm, (3, 1, 1)), joints, pushes, scene.hand.limits)
 
     def _held(self, holder: Slides | HandChains, bits: Sequence[int], **told: Any) -> TestedScene:
-        """Write the scene of a holder whose fingertips touch by bits, and what it is told."""
         body, physics = self.body, self.physics
         found = touched_solids(body, CENTER_OF_MASS, 2.0 * body.radius)
         held = SceneObject(

@@ -59,7 +59,6 @@ meshes in single precision, which moves surfaces by up to 3e-8. A fingertip that
 would arrive with speed, and one that is much deeper is pushed out, which turns objects that two
 others hold and it hardly presses."""
 SOLID_LOOK = {"conaffinity": 0, "mass": 0.0, "group": 2, "rgba": (0.9, 0.6, 0.2, 0.3)}
-"""Attributes of a solid that fingertips touch, shown as glass of another colour."""
 AWAY = 100.0
 """Distance of the table until it is needed, in object radii."""
 PALM_JOINTS = ("x", "y", "z", "about_x", "about_y", "about_z")
@@ -141,7 +140,6 @@ def scene_text(scene: SceneContent) -> str:
 
 
 def _add_object(scene: SceneContent, parts: Parts) -> None:
-    """Add the object, which moves freely, and what is touched in its place."""
     it, touching = scene.held, {"friction": scene.rubbing, **scene.physics.contact()}
     mesh = {"name": "object", "inertia": "shell", "vertex": it.vertices, "face": it.triangles}
     add_element(parts["asset"], "mesh", mesh)

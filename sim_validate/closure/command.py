@@ -188,7 +188,6 @@ def check_installation(command: flags.DoctorFlags, reporter: Reporter) -> int:
 
 
 def _machine() -> dict[str, str]:
-    """Describe what this machine offers, and what to do if something is missing."""
     try:
         graphics = f"MuJoCo draws with {available_graphics() or 'its default'}"
     except GraphicsError as error:

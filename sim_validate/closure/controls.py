@@ -135,7 +135,6 @@ def _refuted(
 
 
 SEPARATING = "separating"
-"""Name of the trial with the separating wrench, which the contacts provably cannot resist."""
 UNLOADED = "unloaded"
 
 

@@ -68,10 +68,6 @@ class Recorded:
     mujoco: str | None = None
     """Version of MuJoCo in which they ended so; None if it is not known."""
 
-    def outcome_of(self, wrench: str) -> str | None:
-        """Look up how the trial of a wrench ended; None if the file does not say."""
-        return self.outcomes.get(wrench, self.others)
-
 
 @declared
 class Replayed(Declared):
@@ -155,7 +151,6 @@ def of_verdict(path: Path, saved: Plan, verdict: Verdict, wanted: WantedTrial) -
 
 
 def _in_trial(path: Path, found: Recorded, verdict: Verdict, trial: int) -> Recorded:
-    """Choose a repeat with noise."""
     found = replace(found, name=f"{found.name} in trial {trial}")
     repeats = () if verdict.robustness is None else verdict.robustness.trials
     if trial >= len(repeats):

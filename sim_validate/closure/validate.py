@@ -324,7 +324,6 @@ def attempted(
 NamedLoad: TypeAlias = tuple[str, Array]
 """A name with a wrench, (6,) [N, N m], torque about the centre of mass."""
 OPENED_BY_NOISE = "noise"
-"""Name of the negative control made of contacts that noise took out of force closure."""
 
 
 def robustness(

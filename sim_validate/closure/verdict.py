@@ -97,7 +97,6 @@ class HoldsWrenches(Declared):
         return weakest.predicted_limit * float(np.linalg.norm(weakest.wrench / scale))
 
     def _contradictions(self) -> Iterator[str]:
-        """Yield where the trials of wrenches contradict the analysis, and limits not found."""
         yield from (each.contradiction for each in self.wrenches if each.contradiction)
         if self.agenda.limits != "none":
             yield from (
@@ -167,7 +166,6 @@ def interval(count: int, of: int) -> tuple[float, float]:
 
 
 TRIALS_SHOWN = 8
-"""Largest number of trials that notebooks show."""
 
 
 @declared

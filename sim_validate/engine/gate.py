@@ -199,7 +199,6 @@ def _pulled_box(case: ClosureCase) -> list[GateCheck]:
 
 
 def _held_across(case: ClosureCase, body: Polyhedron, length: float, lever: float) -> Rig:
-    """Squeeze a box on the two faces across x, with fingers a lever from their middles."""
     contacts = [
         Contact(np.array([s * length / 2, t * lever, 0.0]), np.array([-s, 0.0, 0.0]))
         for s, t in PLACE_SIGNS
@@ -236,7 +235,6 @@ def _ways() -> list[Array]:
 def _by_both(
     name: str, rig: Rig, limits: Sequence[TrialLoad], ways: Sequence[str]
 ) -> list[GateCheck]:
-    """Find the loads at which a box slips by holds and by ramps."""
     held, ramped = bisected_limits(rig, limits), ramped_limits(rig, limits)
     return [*_slips(f"{name}, by holds", held, ways), *_slips(f"{name}, by ramps", ramped, ways)]
 
@@ -397,7 +395,6 @@ def _released(case: ClosureCase, needed: float) -> Array:
 
 
 MANY_FACED, FINGERS_AT_ONCE = "random-100-1", 20
-"""An example mesh with many faces, and how many fingertips touch it at a time."""
 
 
 def surface_touches(case: ClosureCase) -> tuple[GateCheck, GateCheck]:

@@ -18,25 +18,27 @@ from dataclasses import dataclass
 import numpy as np
 
 from grasp_core.arrays import Array, Indices, to_digits
-from grasp_core.closure.contacts import contact_frames
+from grasp_core.closure.contacts import contact_frames, unit_size
+from grasp_core.closure.decision import decide
+from grasp_core.closure.proofs import ContactCones
 from grasp_core.objects.on_faces import nearest_on_surface, within
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.given_contacts import facets_of
 from grasp_core.values import Contact, Grasp
+from scenes.mujoco.held_scene import HeldLayout
+from scenes.mujoco.mjcf_text import quaternion, rotations
+from scenes.mujoco.scene_text import TOUCH_DEPTH
 from sim_validate.engine.traces import rotated
 from sim_validate.settings import Noise, OffBy
 
 NOISE_STREAM = 1
 """Number of the random stream of noise, apart from other draws with the same seed."""
+ROOM_TO_COME = 1.5
+"""Distance from which fingertips come, relative to how far points of the object can have moved."""
 MEETS = 1e-7
 """Distance from the surface at which a ball has met it, in object radii."""
 MOST_ADVANCES = 100
 """Advances after which a ball stops: beside a surface that it nearly grazes they are tiny."""
-
-
-def draws_of_trial(seed: int, number: int) -> np.random.Generator:
-    """Return the generator of one repeated trial's noise."""
-    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(NOISE_STREAM, number)))
 
 
 def draws_by_name(seed: int, *names: object) -> np.random.Generator:
@@ -91,7 +93,8 @@ def disturbed(
     body: Polyhedron, grasp: Grasp, friction: float, noise: Noise, seed: int, number: int
 ) -> Disturbed:
     """Disturb a grasp by the noise of one repeated trial."""
-    rng, center = draws_of_trial(seed, number), body.center_of_mass
+    rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(NOISE_STREAM, number)))
+    center = body.center_of_mass
     shift, turn = noise.shift * body.radius * rng.normal(size=3), rng.normal(size=3)
     slipperiness, heaviness = rng.normal(size=2)
     leaning = math.radians(noise.normal_deg) * rng.normal(size=(len(grasp.contacts), 2))
@@ -149,53 +152,65 @@ def _crossing(points: Array, normals: Array, point: Array, way: Array) -> Array:
     return point + share[:, None] * way
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Balls:
-    """Balls that come along lines until they meet an object's surface."""
+def misplaced_poses(layout: HeldLayout, off_m: Array, off_rad: Array) -> tuple[ObjectPose, ...]:
+    """Return poses of the object that is off by translations and turns, (count, 3) each."""
+    turned = [rotations(to_digits(turned_by(turning))[None])[0] for turning in off_rad]
+    return tuple(
+        ObjectPose(to_digits(way, layout.radius_m), quaternion(rotation))
+        for way, rotation in zip(off_m, turned, strict=True)
+    )
 
-    vertices: Array
-    triangles: Indices
-    size_m: float
-    """Radius of the object [m]."""
-    radii: Array
-    starts: Array
-    """Where the balls start from, (k, 3) [m]."""
-    ways: Array
-    """Unit vectors along which they come, (k, 3)."""
-    room_m: float
-    """Length of the way to the planned places; a ball that meets nothing stops as far beyond."""
 
-    def met(self, poses: Sequence[ObjectPose]) -> Array:
-        """Return how far balls go until they meet the object in each pose, (poses, k) [m]."""
-        lines = [pose.seen(self.starts, self.ways) for pose in poses]
-        starts, ways = (np.array(each) for each in zip(*lines, strict=True))
-        gone, slack = np.zeros(starts.shape[:2]), MEETS * self.size_m
-        middles = starts + self.room_m * ways
-        near = [self._near(middles[:, ball]) for ball in range(len(self.radii))]
-        for _ in range(MOST_ADVANCES):
-            centers = starts + gone[..., None] * ways
-            nearest = np.stack(
-                [
-                    nearest_on_surface(self.vertices, triangles, centers[:, ball])
-                    for ball, triangles in enumerate(near)
-                ],
-                axis=1,
-            )
-            gaps = np.linalg.norm(nearest - centers, axis=2) - self.radii
-            going = (gaps > slack) & (gone < 2.0 * self.room_m)
-            if not going.any():
-                break
-            gone = np.where(going, np.minimum(gone + gaps, 2.0 * self.room_m), gone)
-        return to_digits(gone, self.size_m)
+def tips_met(
+    layout: HeldLayout, poses: Sequence[ObjectPose], off_m: float, off_rad: float
+) -> Array:
+    """Return where fingertips stop, from their planned places along springs, (poses, k, 3) [m]."""
+    ways, room = layout.frames[:, :, 0], ROOM_TO_COME * (off_m + off_rad * layout.radius_m)
+    lines = [pose.seen(layout.tip_centers - room * ways, ways) for pose in poses]
+    starts, seen = (np.array(each) for each in zip(*lines, strict=True))
+    radii = layout.tip_radius_m - TOUCH_DEPTH * layout.radius_m
+    gone, middles = np.zeros(starts.shape[:2]), starts + room * seen
+    near = [_near(layout, middles[:, finger], room) for finger in range(len(radii))]
+    for _ in range(MOST_ADVANCES):
+        centers = starts + gone[..., None] * seen
+        nearest = np.stack(
+            [
+                nearest_on_surface(layout.vertices, triangles, centers[:, finger])
+                for finger, triangles in enumerate(near)
+            ],
+            axis=1,
+        )
+        gaps = np.linalg.norm(nearest - centers, axis=2) - radii
+        going = (gaps > MEETS * layout.radius_m) & (gone < 2.0 * room)
+        if not going.any():
+            break
+        gone = np.where(going, np.minimum(gone + gaps, 2.0 * room), gone)
+    back = (to_digits(gone, layout.radius_m) - room)[..., None] * ways
+    return np.einsum("kij,pki->pkj", layout.axes, back)
 
-    def _near(self, middles: Array) -> Indices:
-        """Return the triangles, (t, 3), that can be the nearest to a point on a ball's way."""
-        # with the surface at d from a middle, one beyond d + 2 room from it is nowhere the nearest
-        corners = self.vertices[self.triangles]
-        nearest = nearest_on_surface(self.vertices, self.triangles, middles)
-        reach = np.linalg.norm(nearest - middles, axis=1) + 2.0 * self.room_m
-        reach += MEETS * self.size_m
-        centers = corners.mean(axis=1)
-        extents = np.linalg.norm(corners - centers[:, None], axis=2).max(axis=1)
-        distances = np.linalg.norm(centers - middles[:, None], axis=2) - extents
-        return self.triangles[(distances <= reach[:, None]).any(axis=0)]
+
+def _near(layout: HeldLayout, middles: Array, room: float) -> Indices:
+    """Return the triangles, (t, 3), that can be the nearest to a point within `room` of others."""
+    # with the surface at d from a middle, one beyond d + 2 room from it is nowhere the nearest
+    corners = layout.vertices[layout.triangles]
+    nearest = nearest_on_surface(layout.vertices, layout.triangles, middles)
+    reach = np.linalg.norm(nearest - middles, axis=1) + 2.0 * room + MEETS * layout.radius_m
+    centers = corners.mean(axis=1)
+    extents = np.linalg.norm(corners - centers[:, None], axis=2).max(axis=1)
+    distances = np.linalg.norm(centers - middles[:, None], axis=2) - extents
+    return layout.triangles[(distances <= reach[:, None]).any(axis=0)]
+
+
+def closed_there(layout: HeldLayout, pose: ObjectPose, tips: Array) -> bool | None:
+    """Decide whether fingertips that stop as `tips_met` says hold a moved object in force closure.
+
+    None where it is too close to decide.
+    """
+    centers = layout.tip_centers + np.einsum("kij,kj->ki", layout.axes, tips) - pose.moved
+    centers = centers @ rotations(pose.quaternion[None])[0]
+    contacts = nearest_on_surface(layout.vertices, layout.triangles, centers)
+    normals, gaps = contacts - centers, np.linalg.norm(contacts - centers, axis=1)
+    if (gaps > layout.tip_radius_m + MEETS * layout.radius_m).any():
+        return False
+    arms, _, _ = unit_size(contacts[None])
+    return decide(ContactCones.at(arms[0], normals / gaps[:, None], layout.friction)).closed

@@ -29,13 +29,11 @@ STATE = (
 )  # fmt: skip
 """Parts of a state, which lie in the order of their bits."""
 CLOCK = 0
-"""Place of the time in a state."""
 OBJECT_END, PALM_END = 6, 12
 """Joint velocities up to the end of the object's, and up to the end of the palm's."""
 FEWEST_SIMULATIONS = 2
 """Fewest trials that room is made for: one to close the fingers, and most controls have two."""
 CLOSURE_STEPS = 5
-"""Simulation steps per sample of a closure trial."""
 CLOCK_SLACK_S = 1e-9
 """Largest clock error that counts as rounding [s]: simulated time is a sum of equal steps, and a
 reset would change it by milliseconds."""

@@ -114,11 +114,6 @@ class HeldCase:
         return min(self.push_n, SOFT_PUSH * self.stiffness_n_per_m * self.halves[1])
 
     @property
-    def slip_n(self) -> float:
-        """The load along z at which the four fingers slip by statics, 4 mu N [N]."""
-        return BOX_FINGERS * self.friction * self.push
-
-    @property
     def light_n(self) -> float:
         """A load along each axis at once under which no fingertip slips or lifts off [N]."""
         mu = self.friction  # a contact takes q, a quarter, and slips if 2^.5 q >= mu (N - q)
@@ -206,7 +201,6 @@ WINDOW = 0.03
 once per sample and the box follows within one, so this divided by the samples of half a rise is the
 error of a load of slip: a fifth of a percent."""
 OBLIQUE = math.radians(30.0)
-"""Angle from z of a weight across contacts whose cones may have edges."""
 RING_DAMPING = 0.01
 """Damping ratio of the ring, lowered so that it lasts."""
 KNOCKED = 0.05
@@ -226,7 +220,6 @@ JUMP, JUMP_SHARE = 6, 0.4
 """Samples for which a sudden load stays, and its size relative to a light one: forces overshoot to
 twice a jump at most."""
 SPARE_SAMPLES = 8
-"""Samples of a ring beyond its periods."""
 SETTLING_TIMES = 8.0
 """Time that a held load stays before it is in the damper's own times c / k."""
 
@@ -273,7 +266,6 @@ def held_box(case: HeldCase) -> tuple[GateCheck, ...]:
 
 
 def _oblique(case: HeldCase) -> GateCheck:
-    """Let a box weigh obliquely on fingers that all push along x, and check when it slips."""
     bench = HeldBench(case.clamped_box())
     _, start = bench.settled(paths.closing(SQUEEZE_SETTLE_S))
     drive = _ramp(case, 0.0, np.array([0.0, math.sin(OBLIQUE), -math.cos(OBLIQUE)]))
@@ -287,14 +279,14 @@ def _ramp(case: HeldCase, rising: float, way: Array = DOWN) -> Drive:
     """Return the drive in which a weight grows past slip, a part of it as the palm's rise."""
     low = (1.0 - WINDOW) / (1.0 + WINDOW)
     share = np.concatenate([low * case.rise(), low + (1.0 - low) * case.rise(0.5 * SLOW_RISE)])
-    whole = (1.0 + WINDOW) * case.slip_n / case.object_kg * share[:, None] * way
+    slip_n = BOX_FINGERS * case.friction * case.push  # by statics
+    whole = (1.0 + WINDOW) * slip_n / case.object_kg * share[:, None] * way
     drive = replace(idle(len(share)), gravity=(1.0 - rising) * whole, shares=share)
     accelerations = np.hstack([-rising * whole, np.zeros((len(share), 3))])
     return replace(drive, accelerations=accelerations)
 
 
 def _creep(case: HeldCase, motion: HeldMotion) -> GateCheck:
-    """Check how far contacts that stick creep in the time of the longest trial."""
     last, slid = _period(case), motion.slides()
     speed = float(np.abs(slid[-1] - slid[-last]).max()) / ((last - 1) * SAMPLE_S)
     longest = len(paths.turned_weight(case.frequency)) * SAMPLE_S
@@ -304,7 +296,6 @@ def _creep(case: HeldCase, motion: HeldMotion) -> GateCheck:
 
 
 def _jumps(case: HeldCase, motion: HeldMotion) -> GateCheck:
-    """Check the contact forces while a load comes and goes suddenly, sample by sample."""
     load, w, zeta = JUMP_SHARE * case.light_n, case.frequency, case.damping_ratio
     share = case.object_kg / case.moving_kg
     linalg: Any = importlib.import_module("scipy.linalg")
@@ -432,7 +423,6 @@ def _apart(case: HeldCase, bench: HeldBench, drive: Drive) -> Drive:
 
 
 def _lifted(case: HeldCase, bench: HeldBench) -> tuple[GateCheck, GateCheck]:
-    """Lift the box off a table, with a weight that its springs carry lightly."""
     weight = min(case.object_kg * GRAVITY_M_PER_S2, case.light_n)
     height = RAISED * weight / (BOX_FINGERS * case.stiffness_n_per_m)
     drive, begun = paths.lift(-DOWN, height, SAMPLE_S * len(case.rise()))
@@ -452,11 +442,8 @@ def _lifted(case: HeldCase, bench: HeldBench) -> tuple[GateCheck, GateCheck]:
 BLOW = 1.2
 """Largest force of the blow, relative to the pushes of all fingers."""
 PERIODS_WATCHED = 1.0
-"""Time for which the box is watched, in periods of its motion along an axis."""
 LEAST_WATCHED = 8
-"""Least number of samples for which it is watched."""
 STEPS_SHORTER = 4
-"""How much shorter the steps are that it is compared with."""
 CHANGED = 0.25
 """Largest difference, over the largest displacement: steps of the usual length differ by 0.02 to
 0.1, in a few cases by 0.2; steps twice as long by 0.27 for boxes of some grams, four times as long
@@ -479,7 +466,6 @@ def struck_box(case: HeldCase) -> GateCheck:
 
 
 def _blow(case: HeldCase) -> Drive:
-    """Return the drive of half a sine of force along x, as long as a knock, and what follows."""
     strike = paths.samples(paths.STRIKE_S)
     after = max(LEAST_WATCHED, paths.samples(PERIODS_WATCHED * 2.0 * np.pi / case.frequency))
     wrenches = np.zeros((strike + after, 6))

@@ -27,76 +27,29 @@ Where (1) leaves a cone, a contact slides while the fingers close, and that coun
 
 import importlib
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from grasp_core.arrays import Array, to_digits
-from grasp_core.closure.contacts import grasp_map, unit_size
-from grasp_core.closure.decision import decide
-from grasp_core.closure.proofs import ContactCones
+from grasp_core.arrays import Array
+from grasp_core.closure.contacts import grasp_map
 from grasp_core.errors import InputError, SolverError
 from grasp_core.execution.first_slip import first_slip
 from grasp_core.execution.grips import Grip
 from grasp_core.execution.loads import GRAVITY_M_PER_S2, Reactions
 from grasp_core.execution.squeeze_certificate import BestSqueeze
-from grasp_core.objects.on_faces import nearest_on_surface
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.shells import solid_angles
 from grasp_core.solvers.ties import first_best, largest_first
 from scenes.mujoco.held_scene import HeldLayout
-from scenes.mujoco.mjcf_text import quaternion, rotations
-from scenes.mujoco.scene_text import TOUCH_DEPTH
-from sim_validate.engine.misplacement import MEETS, Balls, ObjectPose, drawn_errors, turned_by
+from sim_validate.engine.misplacement import closed_there, drawn_errors, misplaced_poses, tips_met
 from sim_validate.execution import paths
 from sim_validate.execution.paths import Drive, Table
 from sim_validate.execution.simulate import SLID, HeldBench, HeldMotion, outcome
 from sim_validate.execution.verdict import ExecutionControl, Skipped
 from sim_validate.settings import ExecutionSettings, TrialKind
-
-ROOM_TO_COME = 1.5
-"""Distance from which fingertips come, relative to how far points of the object can have moved."""
-
-
-def misplaced_poses(layout: HeldLayout, off_m: Array, off_rad: Array) -> tuple[ObjectPose, ...]:
-    """Return poses of the object that is off by translations and turns, (count, 3) each."""
-    turned = [rotations(to_digits(turned_by(turning))[None])[0] for turning in off_rad]
-    return tuple(
-        ObjectPose(to_digits(way, layout.radius_m), quaternion(rotation))
-        for way, rotation in zip(off_m, turned, strict=True)
-    )
-
-
-def tips_met(
-    layout: HeldLayout, poses: Sequence[ObjectPose], off_m: float, off_rad: float
-) -> Array:
-    """Return where fingertips stop, from their planned places along springs, (poses, k, 3) [m]."""
-    ways, room = layout.frames[:, :, 0], ROOM_TO_COME * (off_m + off_rad * layout.radius_m)
-    balls = Balls(
-        layout.vertices, layout.triangles, layout.radius_m,
-        layout.tip_radius_m - TOUCH_DEPTH * layout.radius_m, layout.tip_centers - room * ways, ways,
-        room,
-    )  # fmt: skip
-    back = (balls.met(poses) - room)[..., None] * ways
-    return np.einsum("kij,pki->pkj", layout.axes, back)
-
-
-def closed_there(layout: HeldLayout, pose: ObjectPose, tips: Array) -> bool | None:
-    """Decide whether fingertips that stop as `tips_met` says hold a moved object in force closure.
-
-    None where it is too close to decide.
-    """
-    centers = layout.tip_centers + np.einsum("kij,kj->ki", layout.axes, tips) - pose.moved
-    centers = centers @ rotations(pose.quaternion[None])[0]
-    contacts = nearest_on_surface(layout.vertices, layout.triangles, centers)
-    normals, gaps = contacts - centers, np.linalg.norm(contacts - centers, axis=1)
-    if (gaps > layout.tip_radius_m + MEETS * layout.radius_m).any():
-        return False
-    arms, _, _ = unit_size(contacts[None])
-    return decide(ContactCones.at(arms[0], normals / gaps[:, None], layout.friction)).closed
-
 
 FACET_SLACK = 1e-6
 """Difference of normals, and of offsets in object radii, up to which facets are one face."""
@@ -152,7 +105,6 @@ def resting(body: Polyhedron, tips: Array, radii: Array) -> Rest | None:
 
 AXIS_LETTERS = ("x", "y", "z")
 SIGNED_AXES = tuple((sign, axis) for axis in range(3) for sign in (1.0, -1.0))
-"""Sign and axis of the six directions of stops and knocks."""
 OF_NO_SIZE: dict[TrialKind, str] = {"shake": "shake_g", "knock": "knock_n_s"}
 """Setting whose zero leaves no trial of a kind."""
 

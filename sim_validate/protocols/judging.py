@@ -163,7 +163,6 @@ def _judged(
     protocol: PublishedProtocol, scene: TestedScene, friction: float, setup: Setup,
     ours: OurVerdict, grasp: str, hand: str = "",
 ) -> Judgement:  # fmt: skip
-    """Run the test, and put its verdict beside ours."""
     runs = their_verdict(protocol, scene, setup.threads)
     push_n = float(scene.pushes_n.max(initial=0.0))
     return Judgement(grasp, protocol.name, friction, scene.mass_kg, push_n, runs, ours, hand)
@@ -287,7 +286,6 @@ def timeline(protocol: PublishedProtocol, scene: TestedScene, run: ProtocolRun) 
 
 
 def _closing(protocol: PublishedProtocol, scene: TestedScene, sample_s: float) -> Array:
-    """Return commands from open to touching, then to squeezing, at equal steps, (n, u)."""
     parts = [np.zeros((0, len(scene.shut)))]
     for seconds, begin, end in (
         (protocol.close_s, scene.opened, scene.shut),

@@ -170,7 +170,7 @@ def replay_trial(command: flags.ReplayFlags, reporter: Reporter) -> int:
         source, WantedTrial(command.grasp, command.control, command.trial, command.grasps)
     )
     found = replayed(recorded, command.wrench)
-    said = recorded.outcome_of(found.name)
+    said = recorded.outcomes.get(found.name, recorded.others)
     _show(recorded, found, said, reporter)
     files = [] if command.out is None else list(_written(found, command, reporter))
     beside = {"recorded_outcome": said, "files": [str(path) for path in files]}

@@ -11,8 +11,13 @@ from scenes.mujoco.fingertip_room import fitting_radius
 from scenes.mujoco.held_scene import held_layout
 from scenes.mujoco.scene_text import TOUCH_DEPTH
 from scenes.settings import HeldSettings
-from sim_validate.engine.misplacement import drawn_errors
-from sim_validate.execution.trials import ROOM_TO_COME, closed_there, misplaced_poses, tips_met
+from sim_validate.engine.misplacement import (
+    ROOM_TO_COME,
+    closed_there,
+    drawn_errors,
+    misplaced_poses,
+    tips_met,
+)
 from tests.sim_validate.execution.held_rigs import planned
 
 OFF_M, OFF_RAD = 0.002, np.radians(3.0)
