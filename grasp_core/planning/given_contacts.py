@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, Indices, frozen, frozen_units
+from grasp_core.closure.closure_certificate import ClosureCertificate
 from grasp_core.closure.critical_friction import critical_friction
-from grasp_core.closure.force_closure import ClosureCertificate, force_closure
+from grasp_core.closure.force_closure import force_closure
 from grasp_core.cones.spanning import span_angle
 from grasp_core.errors import InputError
 from grasp_core.geometry.polygons import circle, plane_frame

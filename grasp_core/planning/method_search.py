@@ -27,10 +27,10 @@ from typing import TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.closure.force_closure import ClosureCertificate
+from grasp_core.closure.closure_certificate import ClosureCertificate
 from grasp_core.cones.spanning import each_cones_positively_span
 from grasp_core.errors import SolverError
-from grasp_core.families.absence import Absence
+from grasp_core.families.absence_certificate import Absence
 from grasp_core.families.free import RESTARTS, Undecided, close_patches, place_free
 from grasp_core.families.placements import Attempts, Placement
 from grasp_core.families.placing import (

@@ -1,8 +1,8 @@
 """Finds a proved lower bound of the chance that a grasp is closed when it is not placed exactly.
 
-`placement` derives what is proved. The search tries prisms of several lengths, and for each the
-least friction with which a cover is found: little friction leaves more to turns, long prisms leave
-more to translations, and both make a cover harder.
+`placement_certificate` derives what is proved. The search tries prisms of several lengths, and for
+each the least friction with which a cover is found: little friction leaves more to turns, long
+prisms leave more to translations, and both make a cover harder.
 
 Fingers must meet their own faces first. Where other parts of the object are in front of a face, no
 higher than fingers come from, a finger that is turned by up to T against the face passes beside a
@@ -32,14 +32,14 @@ from grasp_core.objects.planar_faces import planar_slack
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.regions.certify_regions import RegionUnit, room_under
 from grasp_core.regions.growth import Sites, search_cover, twist_axes
-from grasp_core.regions.placement import (
+from grasp_core.regions.placement_certificate import (
     DISC_SIDES,
     Misplacement,
     PlacementProbability,
     bound,
     chance_of_turning,
 )
-from grasp_core.regions.proof import TwistCover
+from grasp_core.regions.regions_certificate import TwistCover
 from grasp_core.small_objects import fitted
 from grasp_core.solvers.ties import first_best
 from grasp_core.values import FINGERS, Grasp, four

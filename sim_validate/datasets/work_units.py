@@ -23,7 +23,7 @@ from types import MappingProxyType
 from typing import Annotated, Any
 
 from grasp_core.arrays import Array, Shape
-from grasp_core.closure.force_closure import ClosureCertificate
+from grasp_core.closure.closure_certificate import ClosureCertificate
 from grasp_core.declared import Declared, declared
 from grasp_core.errors import GraspError, InputError, UnfaithfulError, about
 from grasp_core.files.json_text import json_of
@@ -31,10 +31,10 @@ from grasp_core.files.records import record_of
 from grasp_core.files.text_files import read_text
 from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron
 from grasp_core.planning.given_contacts import grasp_of, seat
+from grasp_core.planning.grasps_json import Overrides, contact_sets_from_json
 from grasp_core.planning.planner import plan
 from grasp_core.planning.settings import PlanSettings
 from grasp_core.provenance import versions
-from grasp_core.records.grasps_json import Overrides, contact_sets_from_json
 from grasp_core.settings import as_table
 from grasp_core.values import FINGERS, Contact, Grasp
 from scenes.example_objects import example_object

@@ -42,9 +42,9 @@ from grasp_core.closure.contacts import (
 )
 from grasp_core.declared import Declared, declared
 from grasp_core.errors import NoForcesError, SolverError, UndecidedError
-from grasp_core.forces.contact_forces import even_forces
 from grasp_core.kinds import OrInfinity
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.quality.contact_forces import even_forces
 from grasp_core.quality.motors import Motors
 from grasp_core.quality.wrench_limits import (
     WrenchBody,

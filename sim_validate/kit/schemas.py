@@ -55,7 +55,7 @@ class FileKind(NamedTuple):
 
 
 KINDS: Mapping[str, FileKind] = {
-    "grasps": FileKind(GRASPS, "grasp_core.records.grasps_json:GraspsFile"),
+    "grasps": FileKind(GRASPS, "grasp_core.planning.grasps_json:GraspsFile"),
     "best": FileKind(BEST, "sim_validate.planning.best:Best"),
     "transfer": FileKind(TRANSFER, "sim_validate.planning.transfer:TransferFile"),
     "verdicts": FileKind(VERDICTS, "sim_validate.closure.verdict:Verdicts"),
@@ -70,7 +70,7 @@ KINDS: Mapping[str, FileKind] = {
     "baseline": FileKind(BASELINE, "sim_validate.baselines.baseline:Baseline"),
     "analyses": FileKind(ANALYSES, "sim_validate.planning.analyze:Analyses"),
     "wrenches": FileKind(WRENCH_FILE, "sim_validate.engine.setup:WrenchFile"),
-    "contacts": FileKind(CONTACTS_FILE, "grasp_core.records.grasps_json:ContactsFile"),
+    "contacts": FileKind(CONTACTS_FILE, "grasp_core.planning.grasps_json:ContactsFile"),
     "dataset": FileKind("configuration of a dataset, TOML",
                         "sim_validate.datasets.config:DatasetConfig", True),
     "setup": FileKind("setup of the simulation, TOML", "sim_validate.engine.setup:Setup", True),

@@ -30,7 +30,7 @@ from grasp_core.objects.face_pieces import inscribed_radius
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.regions.certify_placement import misplacement, placement_bound
 from grasp_core.regions.certify_regions import certify_regions
-from grasp_core.regions.proof import CertifiedRegions, TwistCover
+from grasp_core.regions.regions_certificate import CertifiedRegions, TwistCover
 from grasp_core.stopping import Stop
 from grasp_core.values import FINGERS, ContactRegion, Grasp, four
 from sim_validate.kit import simulation_flags

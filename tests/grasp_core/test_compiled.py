@@ -8,15 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from grasp_core.compiled import (
-    compiled,
-    copy_of,
-    folders,
-    is_kept,
-    loop,
-    state_of,
-    why_not_kept,
-)
+from grasp_core.compiled import compiled, copy_of, folders, is_kept, loop, state_of, why_not_kept
 from grasp_core.errors import InputError
 
 ROOT = Path(__file__).parents[2]

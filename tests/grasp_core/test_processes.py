@@ -11,13 +11,7 @@ import pytest
 
 from grasp_core import processes as module
 from grasp_core.errors import MeshError, MeshRefusal
-from grasp_core.processes import (
-    ProcessEndedError,
-    local_processes,
-    receive,
-    send,
-    unpacked,
-)
+from grasp_core.processes import ProcessEndedError, local_processes, receive, send, unpacked
 from tests.grasp_core import tasks_to_do as tasks
 from tests.patience import HANGING_S
 

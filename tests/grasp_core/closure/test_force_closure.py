@@ -9,11 +9,7 @@ from grasp_core.closure import force_closure as module
 from grasp_core.closure.decision import Decision
 from grasp_core.files.json_text import text_of
 from grasp_core.files.records import from_record, record_of
-from tests.judges import (
-    TETRA_CENTERS,
-    TETRA_NORMALS,
-    random_contacts,
-)
+from tests.judges import TETRA_CENTERS, TETRA_NORMALS, random_contacts
 from tests.tampering.changes import forged
 
 

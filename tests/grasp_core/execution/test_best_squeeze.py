@@ -9,13 +9,7 @@ import grasp_core as gc
 from grasp_core.execution import best_squeeze as module
 from grasp_core.execution.loads import Reactions
 from scenes.example_objects import example_object
-from tests.grasp_core.execution.held import (
-    ASIDE,
-    HALF,
-    bodies_and_grasps,
-    box,
-    opposed,
-)
+from tests.grasp_core.execution.held import ASIDE, HALF, bodies_and_grasps, box, opposed
 from tests.tampering import squeezes
 from tests.tampering.changes import forged
 

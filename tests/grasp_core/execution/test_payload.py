@@ -5,11 +5,7 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.execution.carried_mass import GAP
-from tests.grasp_core.execution.held import (
-    bodies_and_grasps,
-    box,
-    opposed,
-)
+from tests.grasp_core.execution.held import bodies_and_grasps, box, opposed
 from tests.grasp_core.execution.jointed import hand_of, pushing
 from tests.tampering import hand_payloads
 from tests.tampering.changes import forged

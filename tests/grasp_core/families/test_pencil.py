@@ -8,12 +8,7 @@ import grasp_core as gc
 from grasp_core.families.placements import LEAST_RADIUS
 from grasp_core.families.placing import CELL_A, CELL_B, CONSTRUCTIONS
 from scenes.example_objects import example_object
-from tests.grasp_core.families.disc_borders import (
-    BORDER,
-    descended_margin,
-    extremes,
-    least_margin,
-)
+from tests.grasp_core.families.disc_borders import BORDER, descended_margin, extremes, least_margin
 from tests.grasp_core.quadruples import paired_quadruples
 from tests.grasp_core.regular_solids import TOLERANCE
 

@@ -10,12 +10,7 @@ import grasp_core as gc
 import scenes
 from grasp_core.errors import InputError
 from grasp_core.hands.hand import Coupling
-from tests.grasp_core.hands.gripping import (
-    FRICTION,
-    grasps,
-    plain_hand,
-    scaled,
-)
+from tests.grasp_core.hands.gripping import FRICTION, grasps, plain_hand, scaled
 from tests.three_fingers import THREE_TIPS, three_fingers_file
 
 CURLS = tuple(

@@ -13,15 +13,7 @@ from grasp_core.errors import MeshRefusal
 from grasp_core.mesh_files.reading import mesh_of_bytes
 from grasp_core.objects.polyhedron import UNITS_M
 from tests.bad_input.mesh_texts import obj, turned
-from tests.bad_input.of_threemf import (
-    PRODUCTION,
-    components,
-    item,
-    mesh,
-    model,
-    object_,
-    threemf,
-)
+from tests.bad_input.of_threemf import PRODUCTION, components, item, mesh, model, object_, threemf
 from tests.fuzzing.mesh_files import same_triangles, triangles_of
 
 SIZE_M = np.array([0.0762, 0.0508, 0.0254])

@@ -5,12 +5,7 @@ from scipy.spatial import ConvexHull
 import grasp_core as gc
 from grasp_core.quality import ferrari_canny as module
 from grasp_core.quality.wrench_limits import WrenchBody, limit_of
-from tests.judges import (
-    TETRA_CENTERS,
-    TETRA_NORMALS,
-    pyramid_wrenches,
-    random_contacts,
-)
+from tests.judges import TETRA_CENTERS, TETRA_NORMALS, pyramid_wrenches, random_contacts
 from tests.tampering.changes import forged
 from tests.tampering.exact_closure import unit_arms
 

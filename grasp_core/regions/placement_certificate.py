@@ -11,7 +11,7 @@ the normal n'_i = R n_i, and the finger meets its plane at
     x_i + e_i + s_i n_i,    s_i = (n_i.d_i - n'_i.(d_i + e_i - t)) / n_i.n'_i.              (1)
 
 However far the object moves, a contact stays on its finger's line. It slides along that line, and
-its normal turns by at most |w|. So a cover (`proof`) over the prisms
+its normal turns by at most |w|. So a cover (`regions_certificate`) over the prisms
 
     K_i = {x_i + e + s n_i :  |e| <= E, |s| <= S_i}  with normals n_i and friction m          (2)
 
@@ -65,7 +65,7 @@ from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError
 from grasp_core.geometry.polygons import circle, convex_polygon, plane_frame
 from grasp_core.kinds import Friction, NotNegative, Share
-from grasp_core.regions.proof import PLACE_SLACK, TwistCover
+from grasp_core.regions.regions_certificate import PLACE_SLACK, TwistCover
 from grasp_core.values import FINGERS
 
 ESTIMATE_DRAWS = 2000
