@@ -81,7 +81,6 @@ from grasp_core.values import FINGERS, four
 SMALLER = 0.5
 """Size of randomly shrunk pieces, relative to the piece."""
 PATCH_SIDES = 8
-"""Number of facets of the pyramids."""
 ZERO_SINGULAR = 1e-6
 """Singular values smaller than this, relative to the largest, are zero but for rounding."""
 FREE_INSET = 1e-4

@@ -224,9 +224,7 @@ GENERAL = np.array([0.41421, 0.56714, 0.69315])
 """Direction of the line on which points are projected, perpendicular to no face that parts usually
 have. It is shorter than one, so that projections are closer together than points."""
 MOST_NEIGHBOURS = 64
-"""Largest number of neighbours on the line that are compared with a point one by one."""
 LINKS_PER_POINT = 100
-"""Largest number of links per point."""
 
 
 def close_pairs(points: Array, reach: float) -> Indices:

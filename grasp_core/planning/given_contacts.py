@@ -42,7 +42,6 @@ LARGEST_LEAN = math.radians(20.0)
 PATCH_RADIUS = 0.05
 """Radius of the face around a contact on a curved surface, relative to the object's size."""
 PATCH_CORNERS = 16
-"""Corners of the face around a contact on a curved surface."""
 NEARER_FACE = 1e-9
 """Distance, relative to the object's size, by which a face must be nearer than an earlier one to
 replace it: a contact on an edge goes to the first of its faces with a fitting normal."""

@@ -62,7 +62,6 @@ from grasp_core.stopping import never, until
 from grasp_core.values import FaceQuadruple, ForceCone, four
 
 SMALLEST_CHUNK, LARGEST_CHUNK = 32, 2048
-"""Fewest and most quadruples whose bounds are tightened together."""
 SMALLEST_TILT = 512
 """Fewest quadruples whose cones are chosen together: smaller groups take hardly less time."""
 BLOCK, TABLE, QUADRUPLE = range(3)
@@ -70,7 +69,6 @@ BLOCK, TABLE, QUADRUPLE = range(3)
 TOGETHER = 32
 """Number of blocks of quadruples searched at once: a million take some hundred megabytes."""
 MOST_ATTEMPTS = 512
-"""Number of attempts that are made together at most."""
 BEATEN_SHARE = 1e-5
 """Share by which a grasp must beat the worst one kept: symmetric objects hold many equal ones."""
 ONE_GRASP = 1e-6

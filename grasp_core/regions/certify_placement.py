@@ -48,14 +48,12 @@ OFF_M, OFF_RAD = 2e-3, math.radians(2.0)
 """Standard deviations of place and turn that rankings and datasets count on; that of the place is
 less for small objects."""
 PLACEMENT_CONES = 4000
-"""Default for the largest number of cones in one proof."""
 PRISMS = ((4.5, 4.0), (4.0, 3.2), (3.5, 2.6))
 """Half-widths E and half-lengths S of the prisms that are tried, in deviations of fingers beside
 their lines and of slides along them."""
 APPROACH_LENGTH = 3.0
 """Distance from which fingers come, in half-lengths of the longest prism."""
 ANGLE_HALVINGS = 5
-"""Number of times that the angle between no friction and all of it is halved."""
 SMALL_CHANCE = 0.005
 """Chance of too large turns below which a smaller one is not sought."""
 IN_FRONT = 1e-9

@@ -27,7 +27,6 @@ from grasp_core.regions.regions_certificate import TWIST, UNDIVIDED
 
 TWIST_SIZE = 6
 MOST_PLACE_STEPS = 40
-"""Largest number of steps towards the place where a contact resists a twist least."""
 CONE_RAYS = TWIST
 FORCE_ROUNDS = 30  # of the choice of forces, at most
 ANSWERS = 3

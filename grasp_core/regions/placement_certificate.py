@@ -69,15 +69,12 @@ from grasp_core.regions.regions_certificate import PLACE_SLACK, TwistCover
 from grasp_core.values import FINGERS
 
 ESTIMATE_DRAWS = 2000
-"""Number of draws of an estimate."""
 ROUNDING_CHANCE = 1e-9
-"""Chance that pays for rounding."""
 LARGEST_DEVIATIONS = 4.5
 """Largest motions that count, in their largest deviations: a chance of 1.5e-4 for each of t, w."""
 LARGEST_CLOSED_TURN = 1.0
 """Largest turn that may count as closed [rad]."""
 DISC_SIDES = 16
-"""Corners of the polygons around discs of fingers' shifts."""
 TAIL_CHANCES = np.append(np.exp2(np.arange(-1.0, -160.0, -1.0) / 4.0), 0.0)
 """Chances of values above the ends of the intervals that a law is divided into."""
 MASS = -np.diff(TAIL_CHANCES, prepend=1.0)

@@ -448,6 +448,5 @@ def _proved(lower: float, upper: float) -> tuple[str, str]:
 
 
 def _listed(values: Array) -> str:
-    """Print a vector, or several of them."""
     rows = np.atleast_2d(to_digits(values) + 0.0).tolist()
     return "; ".join(", ".join(f"{value:.4g}" for value in row) for row in rows)

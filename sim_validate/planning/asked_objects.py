@@ -16,7 +16,6 @@ from sim_validate.kit import command_flags
 from sim_validate.kit.console import Reporter
 
 NAMES_LISTED = 5
-"""Largest number of names that a message lists."""
 
 
 def is_mesh_file(name: str) -> bool:

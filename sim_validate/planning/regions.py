@@ -50,7 +50,6 @@ from sim_validate.planning.asked_objects import asked_grasps
 from sim_validate.settings import Certifying
 
 PROOFS = "proofs"
-"""Folder of the proof files, beside `regions.json`."""
 MILLI = 1e3
 POLYGONS = tuple(f"region{i}_m" for i in range(FINGERS))
 BORDERS = tuple(f"border{i}_m" for i in range(FINGERS))
@@ -62,7 +61,6 @@ FIELDS: Mapping[str, str] = {
 """Name of the array in a proof file for fields of `CertifiedRegions`."""
 ARRAYS = ("axes", "codes", "forces", *FIELDS.values(), *POLYGONS, *BORDERS)
 MOST_REGION_CORNERS = 1000
-"""Largest number of corners of a region's polygon in a file."""
 SMALLEST_SCALE, LARGEST_SCALE = 1e-6, 1e6
 """Smallest and largest unit of length of a proof, and largest coordinate in it [m]."""
 
