@@ -55,7 +55,7 @@ class FileKind(NamedTuple):
 
 
 KINDS: Mapping[str, FileKind] = {
-    "grasps": FileKind(GRASPS, "grasp_core.planning.grasps_json:GraspsFile"),
+    "grasps": FileKind(GRASPS, "grasp_core.planning.grasps_json:SavedGrasps"),
     "best": FileKind(BEST, "sim_validate.planning.best:Best"),
     "transfer": FileKind(TRANSFER, "sim_validate.planning.transfer:TransferFile"),
     "verdicts": FileKind(VERDICTS, "sim_validate.closure.verdict:Verdicts"),
