@@ -1,9 +1,9 @@
+from grasp_core.closure.closure_certificate import ClosureCertificate as ClosureCertificate
 from grasp_core.closure.critical_friction import critical_friction as critical_friction
 from grasp_core.closure.critical_friction import (
     critical_friction_interval as critical_friction_interval,
 )
 from grasp_core.closure.critical_friction import critical_frictions as critical_frictions
-from grasp_core.closure.force_closure import ClosureCertificate as ClosureCertificate
 from grasp_core.closure.force_closure import force_closure as force_closure
 from grasp_core.closure.friction_interval import FrictionInterval as FrictionInterval
 from grasp_core.closure.lines import classify_lines as classify_lines
@@ -29,7 +29,6 @@ from grasp_core.execution.grips import grip as grip
 from grasp_core.execution.loads import LoadSet as LoadSet
 from grasp_core.execution.loads import any_direction as any_direction
 from grasp_core.execution.squeeze_certificate import BestSqueeze as BestSqueeze
-from grasp_core.forces.contact_forces import contact_forces as contact_forces
 from grasp_core.hands.hand import Hand as Hand
 from grasp_core.hands.hand import load_hand as load_hand
 from grasp_core.hands.hand_motors import hand_motors as hand_motors
@@ -48,11 +47,14 @@ from grasp_core.optimizing.best_grasp import best_grasp as best_grasp
 from grasp_core.optimizing.best_grasp import quality_ceiling as quality_ceiling
 from grasp_core.optimizing.better_contacts import Improvement as Improvement
 from grasp_core.optimizing.better_contacts import optimize_contacts as optimize_contacts
+from grasp_core.planning.grasps_json import load_grasps as load_grasps
+from grasp_core.planning.grasps_json import save_grasps as save_grasps
 from grasp_core.planning.planner import iter_grasps as iter_grasps
 from grasp_core.planning.planner import plan as plan
 from grasp_core.planning.reach import Finger as Finger
 from grasp_core.planning.result import Plan as Plan
 from grasp_core.planning.settings import PlanSettings as PlanSettings
+from grasp_core.quality.contact_forces import contact_forces as contact_forces
 from grasp_core.quality.ferrari_canny import FerrariCanny as FerrariCanny
 from grasp_core.quality.ferrari_canny import ferrari_canny as ferrari_canny
 from grasp_core.quality.metrics import hull_volume as hull_volume
@@ -61,14 +63,12 @@ from grasp_core.quality.metrics import smallest_singular_value as smallest_singu
 from grasp_core.quality.motors import Motors as Motors
 from grasp_core.quality.wrench_limits import WrenchLimit as WrenchLimit
 from grasp_core.quality.wrench_limits import wrench_limits as wrench_limits
-from grasp_core.records.grasps_json import load_grasps as load_grasps
-from grasp_core.records.grasps_json import save_grasps as save_grasps
 from grasp_core.regions.certify_placement import placement_probability as placement_probability
 from grasp_core.regions.certify_regions import certify_regions as certify_regions
-from grasp_core.regions.placement import Misplacement as Misplacement
-from grasp_core.regions.placement import PlacementProbability as PlacementProbability
-from grasp_core.regions.proof import CertifiedRegions as CertifiedRegions
-from grasp_core.transferring.face_changes import FaceChange as FaceChange
+from grasp_core.regions.placement_certificate import Misplacement as Misplacement
+from grasp_core.regions.placement_certificate import PlacementProbability as PlacementProbability
+from grasp_core.regions.regions_certificate import CertifiedRegions as CertifiedRegions
+from grasp_core.transferring.part_comparison import FaceChange as FaceChange
 from grasp_core.transferring.transfer import CarriedContact as CarriedContact
 from grasp_core.transferring.transfer import CarriedGrasp as CarriedGrasp
 from grasp_core.transferring.transfer import GraspFigures as GraspFigures

@@ -186,7 +186,6 @@ class Shape:
         return free or not array.size or self.least <= array.min() <= array.max() <= self.most
 
     def __str__(self) -> str:
-        """Return the shape in words."""
         lengths = ", ".join("any" if n is None else str(n) for n in self.shape)
         entries = "whole numbers" if self.whole else "unit vectors" if self.units else "numbers"
         return f"an array of {entries} of shape ({lengths}{',' * (len(self.shape) == 1)})"

@@ -16,16 +16,13 @@ from pydantic_core import CoreSchema, core_schema
 from grasp_core.messages import shown
 
 HASHED_KINDS = (str, int, bool)
-"""Classes of the fields that a hash is made from."""
 HASHED_ENTRIES = 3
 """Number of entries of an array that a hash is made from: a point tells contacts apart when they
 are looked up in a cache, without looking at each entry of a large mesh."""
 MOST_TEXT = 300
 """Largest number of characters of a value's text: two lines and a half."""
 SHORT_VECTOR = 6
-"""Largest number of components of a vector that is written in full."""
 SHOWN_AS_ZERO = 1e-12
-"""Share of a vector's largest number below which a number is shown as zero."""
 
 
 class ByValue:
@@ -55,7 +52,6 @@ class ByValue:
 
     @classmethod
     def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        """Take only instances of the class."""
         return core_schema.is_instance_schema(cls)
 
 

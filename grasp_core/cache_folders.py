@@ -6,7 +6,6 @@ from contextlib import suppress
 from pathlib import Path
 
 OWN_FOLDER = "graspproof"
-"""Name of our folder in those that others use, too."""
 BYTECODE = "bytecode"
 """Name of the folder in it for bytecode."""
 

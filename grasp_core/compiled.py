@@ -39,11 +39,9 @@ Loop = TypeVar("Loop", bound=Callable[..., Any])
 NUMBA_FAILS = (ImportError, RuntimeError, OSError, ValueError)
 """What numba raises when it is imported with settings that it refuses, or cannot be."""
 HASH_DIGITS = 16
-"""Number of digits of the hash in a copy's name."""
 IMPORTED = re.compile(r"^from ((?:grasp_core|scenes)(?:\.\w+)+) import", re.MULTILINE)
 """Pattern of the imports in a kernel's text."""
 COMPILERS = ("numba", "llvmlite")
-"""Packages that compile."""
 KERNEL_ENDING = "_kernel"
 """Ending of the names of kernels, whose own imports count too."""
 

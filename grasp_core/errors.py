@@ -64,7 +64,6 @@ class MeshError(InputError):
         self.reason, self.message = reason, message
 
     def __str__(self) -> str:
-        """Return the refusal's code and its message, on one line."""
         return f"{self.reason.value}: {self.message}"
 
 

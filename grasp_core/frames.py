@@ -13,7 +13,6 @@ from grasp_core.arrays import Array
 
 MatrixRow: TypeAlias = tuple[float, float, float]
 POSE_SIZE = 4
-"""Rows and columns of a homogeneous transform."""
 SAME_SIZE = 1e-7
 """Difference between components that does not count: rounding, in computing or in a file."""
 

@@ -9,7 +9,6 @@ from grasp_core.errors import InputError
 from grasp_core.messages import shown
 
 SHOWN_IDS = 5
-"""Largest number of ids that a message lists."""
 
 
 class Named(Protocol):

@@ -32,7 +32,6 @@ class FieldError(InputError):
         self.name, self.fault = name, fault
 
     def __str__(self) -> str:
-        """Return the name of the field and what is wrong with it: 'must be .., got ..'."""
         return f"{self.name} {self.fault}"
 
 

@@ -23,9 +23,7 @@ RANKINGS: Mapping[RankBy, str] = {
     "objects with a radius below 25 mm, and 2 degrees",
     "diverse": "for each next grasp, the largest distance from those before it",
 }
-"""What the best grasps have by each ranking."""
 MeasureName: TypeAlias = Literal["ferrari-canny", "weight", "task"]
 """Which loads count: wrenches of unit length, the weight in every orientation, or a user's loads.
 """
 HANDS = ("allegro", "allegro-urdf", "leap")
-"""The names of the built-in hands."""

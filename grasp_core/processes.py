@@ -31,7 +31,6 @@ GivenTask = TypeVar("GivenTask")
 Result = TypeVar("Result")
 
 MESSAGE_LENGTH = struct.Struct("<Q")
-"""How many bytes of a message follow."""
 TASKS_AHEAD = 8
 """Number of tasks per process that are handed out before the first of them is done."""
 STOP_LOOK_S = 0.1

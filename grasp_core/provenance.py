@@ -20,7 +20,6 @@ RECORDED_PACKAGES = (
 )  # fmt: skip
 
 MATRIX_SIZES = (3, 6, 12, 24, 64)
-"""Numbers of rows of the square matrices that `arithmetic` tries."""
 
 
 def versions() -> dict[str, str]:

@@ -9,8 +9,8 @@ from grasp_core.errors import GraspError
 from grasp_core.files.file_kinds import GRASPS
 from grasp_core.files.text_files import write_text
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.planning.grasps_json import plan_to_json
 from grasp_core.planning.result import Plan
-from grasp_core.records.grasps_json import plan_to_json
 from grasp_core.stopping import Stop
 from sim_validate.closure.command import prepared, simulate_grasps
 from sim_validate.closure.validate import checked_for

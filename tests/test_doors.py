@@ -71,6 +71,6 @@ def test_a_plan_that_finds_its_loops_imports_only_what_planning_needs(tmp_path):
     words = ["plan", "wedge", "--limit", "5", "--out", str(tmp_path)]
     assert main([*words, "-q"]) == Exit.GOOD
     code = f"from sim_validate.main import main; main({words!r})"
-    names, said = imported(code, (*NOT_TO_PLAN_AGAIN, "numba", "grasp_core.records.grasps_json"))
-    assert names == ["numba", "grasp_core.records.grasps_json"]
+    names, said = imported(code, (*NOT_TO_PLAN_AGAIN, "numba", "grasp_core.planning.grasps_json"))
+    assert names == ["numba", "grasp_core.planning.grasps_json"]
     assert "5 grasps" in said

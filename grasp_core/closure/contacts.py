@@ -30,9 +30,7 @@ from grasp_core.messages import shown
 from grasp_core.values import FINGERS, Contact, Grasp
 
 LEAST_CONTACTS = 2
-"""Least number of contacts that can balance anything."""
 WRENCH = 6
-"""Number of components of a wrench."""
 LOCAL = 4
 """Number of components of a soft contact's force: three, and a torque about the normal."""
 

@@ -59,7 +59,6 @@ FIRST_TRIAL = 0.5
 MOST_PROGRAMS = 30
 """Most programs per set of contacts; seven are usual."""
 LEAST_TRIED, MOST_TRIED = 1e-6, 1e3
-"""Smallest and largest friction that is tried."""
 RESTING_SHARE = 1e-4
 """Share of the largest z_i below which a contact's z_i counts as zero, and the contact as at rest.
 """

@@ -18,7 +18,6 @@ import numpy as np
 from grasp_core.arrays import Array, frozen
 
 PYRAMID_SIDES = 16
-"""Number of sides of a pyramid, unless a program asks for more."""
 
 
 def inscribed_share(sides: int = PYRAMID_SIDES) -> float:

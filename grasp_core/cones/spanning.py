@@ -43,7 +43,6 @@ GUESS = 2
 COPLANAR = 1e-12
 """Determinant below which three unit vectors count as coplanar: a few rounding errors."""
 TRIPLES = np.array(list(combinations(range(FINGERS), 3)))
-"""Indices of three of four vectors, (4, 3)."""
 
 
 def span_angle(normals: ArrayLike) -> float:

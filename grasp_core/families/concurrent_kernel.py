@@ -68,7 +68,6 @@ Y, DISC_RADII, CONCURRENT_VARIABLES = 3, 11, 15
 """Indices of the first disc centre and of the first radius among (x0, y_1 .. y_4, r_1 .. r_4), and
 the number of these variables."""
 TRIANGLE = 3
-"""Fewest corners of a polygon."""
 
 
 @loop("numpy", once=True)

@@ -57,12 +57,19 @@ from heapq import heappop, heappush
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.closure.closure_certificate import ClosureCertificate
 from grasp_core.closure.contacts import cross_matrix, grasp_map, normal_and_tangential
-from grasp_core.closure.force_closure import ClosureCertificate, certificates, force_closure
+from grasp_core.closure.force_closure import certificates, force_closure
 from grasp_core.closure.lines import classify_lines
 from grasp_core.cones.pyramids import pyramid_facets
 from grasp_core.errors import InputError, UndecidedError
-from grasp_core.families.absence import Absence, PartCorners, Path, corner_contacts, part_at
+from grasp_core.families.absence_certificate import (
+    Absence,
+    PartCorners,
+    Path,
+    corner_contacts,
+    part_at,
+)
 from grasp_core.families.placements import Placement
 from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
@@ -74,7 +81,6 @@ from grasp_core.values import FINGERS, four
 SMALLER = 0.5
 """Size of randomly shrunk pieces, relative to the piece."""
 PATCH_SIDES = 8
-"""Number of facets of the pyramids."""
 ZERO_SINGULAR = 1e-6
 """Singular values smaller than this, relative to the largest, are zero but for rounding."""
 FREE_INSET = 1e-4

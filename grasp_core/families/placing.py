@@ -76,7 +76,6 @@ MIXED_SIDES = np.array([s for s in product((1.0, -1.0), repeat=FINGERS) if abs(s
 CELL_A, CELL_B = np.array([-1.0, -1.0, 1.0, 1.0]), np.array([1.0, 1.0, -1.0, -1.0])
 """Patterns of a pencil: signs of k u in the foci of the fingers, see `pencil_kernel`."""
 DISC_CORNERS = 64
-"""Number of points that are listed on the border of a disc."""
 MOST_CHOICES = 8
 """Most choices of pieces tried on faces that are not convex; the free method multiplies it by
 `max_face_parts`."""

@@ -53,13 +53,7 @@ from numpy.typing import NDArray
 
 from grasp_core.arrays import Array
 from grasp_core.compiled import loop
-from grasp_core.families.discs_kernel import (
-    ACCURACY,
-    FACET_TURNS,
-    balance,
-    facets,
-    fingers_of,
-)
+from grasp_core.families.discs_kernel import ACCURACY, FACET_TURNS, balance, facets, fingers_of
 from grasp_core.families.placements import (
     CONTACTS_PLACED,
     NOT_DECIDED,

@@ -14,7 +14,6 @@ from grasp_core.frames import plane_tangents
 from grasp_core.solvers.ties import first_best
 
 MERGE_ORDERS = 16
-"""Number of orders in which removing diagonals is tried."""
 CONVEX_SLACK = 1e-9
 """How far a corner may turn inwards and still count as straight, relative to the product of its two
 edges' lengths: well above the rounding of coordinates, well below a visible notch."""

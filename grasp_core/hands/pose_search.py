@@ -30,7 +30,8 @@ from itertools import combinations, permutations, product
 import numpy as np
 
 from grasp_core.arrays import Array, Indices, cross, to_digits
-from grasp_core.closure.force_closure import ClosureCertificate, force_closure
+from grasp_core.closure.closure_certificate import ClosureCertificate
+from grasp_core.closure.force_closure import force_closure
 from grasp_core.compiled import compiled
 from grasp_core.errors import SolverError, UndecidedError
 from grasp_core.frames import plane_tangents

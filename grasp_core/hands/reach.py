@@ -21,7 +21,7 @@ from pydantic import Field, computed_field
 
 from grasp_core.arrays import Array, Indices, Shape, UnitVector, frozen, frozen_indices
 from grasp_core.by_value import summary
-from grasp_core.closure.force_closure import ClosureCertificate
+from grasp_core.closure.closure_certificate import ClosureCertificate
 from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError
 from grasp_core.figures import Shown

@@ -34,7 +34,6 @@ TRIANGLES, STRIP = 4, 5
 MODES = {TRIANGLES, STRIP}
 NODE_REFERENCES = {"mesh", "children"}
 POSE_PARTS = {"translation": 3, "rotation": 4, "scale": 3}
-"""Parts of a node's pose, with their counts of numbers."""
 JsonObject = dict[str, Any]
 """A JSON object of a glTF file, whose values are checked where they are used."""
 

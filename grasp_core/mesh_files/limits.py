@@ -11,7 +11,6 @@ from grasp_core.settings import Settings
 
 FaceKind: TypeAlias = Literal["auto", "planar", "patches"]
 MESH_FORMATS = ("obj", "stl", "ply", "off", "glb", "3mf")
-"""Endings of mesh files, which say their format."""
 LengthUnit: TypeAlias = Literal["m", "cm", "mm", "um", "in", "ft"]
 
 

@@ -40,7 +40,6 @@ STL_HEAD = 80
 STL_ROW = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 BYTE_ORDER_MARK, UTF_16 = b"\xef\xbb\xbf", (b"\xff\xfe", b"\xfe\xff")
 SHOWN_FAULT = 100
-"""Largest number of characters of a fault that a message quotes."""
 
 
 class FileSurface(NamedTuple):

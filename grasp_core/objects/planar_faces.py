@@ -358,7 +358,6 @@ a disc are rounded by some 1e-16 of the length divided by this, which must be we
 SAME_HEIGHT = 1.0 - 1e-12
 """Share of a half-plane's distance at which an end of a segment counts as beyond."""
 CANDIDATES = 400
-"""Largest number of points that are tried as the middle of a polygon."""
 
 
 def clearest_point(points: Array, segments: Array) -> tuple[Array, float]:

@@ -254,7 +254,6 @@ def _union(bodies: list[_Body], slack: float) -> list[_Body]:
 
 
 def _joined_by(pairs: list[tuple[int, int]], bodies: list[_Body], united: list[_Body]) -> int:
-    """Count the groups of bodies that pairs connect, or that are in one solid already."""
     marks = [frozenset(body.marks.tolist()) for body in bodies]
     for solid in united:
         first, *others = [k for k, own in enumerate(marks) if not own.isdisjoint(solid.marks)]
@@ -399,7 +398,6 @@ def _crossing(share: float) -> MeshError:
 
 
 MOST_ANGLES = 2_000_000
-"""Largest number of solid angles that are computed for one mesh."""
 FEWEST_SAMPLES, MOST_SAMPLES = 32, 256
 ANGLES_AT_ONCE = 20_000
 """Number of solid angles computed at a time, which stays in the processor's cache."""

@@ -24,7 +24,6 @@ from grasp_core.messages import MILLI
 from grasp_core.values import RIGHT_ANGLE
 
 TRIANGLES_AT_EDGE = 2
-"""Number of triangles that meet at an edge of a closed surface."""
 NO_CAPS = np.empty(0, dtype=np.int64)
 
 Plane: TypeAlias = tuple[Array, Array]

@@ -33,7 +33,6 @@ SAME_PLANES = 0.02
 MOST_PAIRS = 50_000_000
 """Largest number of pairs of triangles of two parts that are compared, which takes a second."""
 PAIRS_AT_ONCE = 500_000
-"""Number of pairs of triangles that are compared at a time."""
 NO_PAIRS = np.empty(0, dtype=np.int64), np.empty(0), np.empty(0)
 
 

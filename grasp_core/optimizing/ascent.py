@@ -58,13 +58,7 @@ from grasp_core.quality.measures import (
     thin,
 )
 from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
-from grasp_core.solvers.ties import (
-    graded,
-    largest_first,
-    nearest_optimum,
-    on_grid,
-    surpassing,
-)
+from grasp_core.solvers.ties import graded, largest_first, nearest_optimum, on_grid, surpassing
 from grasp_core.stopping import never
 from grasp_core.values import FINGERS
 

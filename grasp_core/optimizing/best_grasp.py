@@ -70,12 +70,7 @@ from grasp_core.optimizing.search import EXACT_GAP, Searching
 from grasp_core.optimizing.support_cuts import LEAST_THRESHOLD, CutTree
 from grasp_core.planning.certify import named
 from grasp_core.quality.ferrari_canny import FerrariCanny
-from grasp_core.quality.measures import (
-    FERRARI_CANNY,
-    Measure,
-    ResistedLoads,
-    measured_set,
-)
+from grasp_core.quality.measures import FERRARI_CANNY, Measure, ResistedLoads, measured_set
 from grasp_core.solvers.ties import few_digits, surpassing
 from grasp_core.stopping import Stop
 from grasp_core.values import FINGERS, FaceQuadruple, Grasp, four

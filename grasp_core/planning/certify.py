@@ -20,14 +20,15 @@ import numpy as np
 
 from grasp_core.arrays import Array, frozen_copy
 from grasp_core.by_value import kept
+from grasp_core.closure.closure_certificate import ClosureCertificate
 from grasp_core.closure.contacts import grasp_map, normal_and_tangential
 from grasp_core.closure.critical_friction import critical_friction, critical_frictions
-from grasp_core.closure.force_closure import ClosureCertificate, closing_margins, force_closure
+from grasp_core.closure.force_closure import closing_margins, force_closure
 from grasp_core.closure.lines import classify_each
 from grasp_core.cones.spanning import span_angles
 from grasp_core.declared import altered, trusted
 from grasp_core.errors import InputError, UndecidedError
-from grasp_core.families.absence import Absence
+from grasp_core.families.absence_certificate import Absence
 from grasp_core.families.placements import Placement
 from grasp_core.frames import kept_angle
 from grasp_core.names import Family, Method

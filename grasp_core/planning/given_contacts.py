@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, Indices, frozen, frozen_units
+from grasp_core.closure.closure_certificate import ClosureCertificate
 from grasp_core.closure.critical_friction import critical_friction
-from grasp_core.closure.force_closure import ClosureCertificate, force_closure
+from grasp_core.closure.force_closure import force_closure
 from grasp_core.cones.spanning import span_angle
 from grasp_core.errors import InputError
 from grasp_core.geometry.polygons import circle, plane_frame
@@ -41,7 +42,6 @@ LARGEST_LEAN = math.radians(20.0)
 PATCH_RADIUS = 0.05
 """Radius of the face around a contact on a curved surface, relative to the object's size."""
 PATCH_CORNERS = 16
-"""Corners of the face around a contact on a curved surface."""
 NEARER_FACE = 1e-9
 """Distance, relative to the object's size, by which a face must be nearer than an earlier one to
 replace it: a contact on an edge goes to the first of its faces with a fitting normal."""

@@ -27,10 +27,10 @@ from typing import TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.closure.force_closure import ClosureCertificate
+from grasp_core.closure.closure_certificate import ClosureCertificate
 from grasp_core.cones.spanning import each_cones_positively_span
 from grasp_core.errors import SolverError
-from grasp_core.families.absence import Absence
+from grasp_core.families.absence_certificate import Absence
 from grasp_core.families.free import RESTARTS, Undecided, close_patches, place_free
 from grasp_core.families.placements import Attempts, Placement
 from grasp_core.families.placing import (
@@ -62,7 +62,6 @@ from grasp_core.stopping import never, until
 from grasp_core.values import FaceQuadruple, ForceCone, four
 
 SMALLEST_CHUNK, LARGEST_CHUNK = 32, 2048
-"""Fewest and most quadruples whose bounds are tightened together."""
 SMALLEST_TILT = 512
 """Fewest quadruples whose cones are chosen together: smaller groups take hardly less time."""
 BLOCK, TABLE, QUADRUPLE = range(3)
@@ -70,7 +69,6 @@ BLOCK, TABLE, QUADRUPLE = range(3)
 TOGETHER = 32
 """Number of blocks of quadruples searched at once: a million take some hundred megabytes."""
 MOST_ATTEMPTS = 512
-"""Number of attempts that are made together at most."""
 BEATEN_SHARE = 1e-5
 """Share by which a grasp must beat the worst one kept: symmetric objects hold many equal ones."""
 ONE_GRASP = 1e-6

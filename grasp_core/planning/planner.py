@@ -147,7 +147,6 @@ DEPRECATED = (
     "theta_deg", "cones", "seed", "max_face_parts", "complete", "edge_clearance_m",
     "share_faces_m", "time_limit_s",
 )  # fmt: skip
-"""Settings that were keywords of `plan` themselves."""
 MADE_S = 2e-4
 """Time in which a grasp that is found is put into the object's frame [s]."""
 

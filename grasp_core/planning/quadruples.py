@@ -179,7 +179,6 @@ def _around(sines: Array, thetas: Array) -> Array:
 FIRST_FACES = 14
 """Number of faces in the first block: 1,001 quadruples."""
 LARGEST_BLOCK = 30_000
-"""Most quadruples in one block."""
 SPANNING_SHARE = 0.125
 """Share of quadruples of random directions that positively span space."""
 

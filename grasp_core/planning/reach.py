@@ -32,7 +32,6 @@ from grasp_core.values import FaceQuadruple
 RINGS_DEG = (30.0, 60.0)
 """Angles to the normal at which fingers may approach, besides straight along it [deg]."""
 RING_DIRECTIONS = 6
-"""Number of approach directions tried on each ring around the normal."""
 
 
 @declared

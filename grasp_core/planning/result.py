@@ -35,7 +35,6 @@ ITS_RADIUS = ", the object's radius in m"
 FARTHEST_APPROACH = 1e3
 """Longest free line of a finger, in object radii."""
 COMPLETE_PARTS = 20_000
-"""Parts into which `complete` may cut the faces of one quadruple."""
 MOST_PLANNED_FACES = 1000
 """Most faces to plan with: tables of pairs and of spanning triples take some hundred megabytes."""
 

@@ -104,7 +104,6 @@ FLATTEST_SIMPLEX = 1e-30
 HEIGHTS_AT_ONCE = 2**15
 """Number of heights compared at a time: as many as fit into a processor's cache."""
 SMALLEST_DIVISOR = 1e-300
-"""Smallest number that is divided by: a normal may have length zero."""
 LARGEST_KEY = 2**62
 """Largest integer that may name a ridge, with one digit for each of its corners."""
 

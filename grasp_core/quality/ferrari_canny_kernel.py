@@ -34,7 +34,6 @@ DEAD = 1e300
 LEAST_FIRST_PIVOT = 1e-13
 """Smallest pivot accepted while the first simplex is built, whose points are widely spread."""
 SMALLEST_DIVISOR = 1e-300
-"""Smallest square that is divided by: a simplex may be folded flat."""
 FLATNESS = 1e-9
 """Points closer than this to a common plane, relative to their extent, span nothing more."""
 IN_SIGHT = 1e-12
@@ -251,7 +250,6 @@ def _eliminate(A: Array) -> bool:
 
 @loop()
 def _lowest(hull: Hull) -> int:
-    """Return the simplex whose plane has the least offset."""
     offsets, found = hull.offsets, 0
     for i in range(hull.counts[0]):
         if offsets[i] < offsets[found]:

@@ -1,8 +1,8 @@
 """Finds a proved lower bound of the chance that a grasp is closed when it is not placed exactly.
 
-`placement` derives what is proved. The search tries prisms of several lengths, and for each the
-least friction with which a cover is found: little friction leaves more to turns, long prisms leave
-more to translations, and both make a cover harder.
+`placement_certificate` derives what is proved. The search tries prisms of several lengths, and for
+each the least friction with which a cover is found: little friction leaves more to turns, long
+prisms leave more to translations, and both make a cover harder.
 
 Fingers must meet their own faces first. Where other parts of the object are in front of a face, no
 higher than fingers come from, a finger that is turned by up to T against the face passes beside a
@@ -32,14 +32,14 @@ from grasp_core.objects.planar_faces import planar_slack
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.regions.certify_regions import RegionUnit, room_under
 from grasp_core.regions.growth import Sites, search_cover, twist_axes
-from grasp_core.regions.placement import (
+from grasp_core.regions.placement_certificate import (
     DISC_SIDES,
     Misplacement,
     PlacementProbability,
     bound,
     chance_of_turning,
 )
-from grasp_core.regions.proof import TwistCover
+from grasp_core.regions.regions_certificate import TwistCover
 from grasp_core.small_objects import fitted
 from grasp_core.solvers.ties import first_best
 from grasp_core.values import FINGERS, Grasp, four
@@ -48,14 +48,12 @@ OFF_M, OFF_RAD = 2e-3, math.radians(2.0)
 """Standard deviations of place and turn that rankings and datasets count on; that of the place is
 less for small objects."""
 PLACEMENT_CONES = 4000
-"""Default for the largest number of cones in one proof."""
 PRISMS = ((4.5, 4.0), (4.0, 3.2), (3.5, 2.6))
 """Half-widths E and half-lengths S of the prisms that are tried, in deviations of fingers beside
 their lines and of slides along them."""
 APPROACH_LENGTH = 3.0
 """Distance from which fingers come, in half-lengths of the longest prism."""
 ANGLE_HALVINGS = 5
-"""Number of times that the angle between no friction and all of it is halved."""
 SMALL_CHANCE = 0.005
 """Chance of too large turns below which a smaller one is not sought."""
 IN_FRONT = 1e-9

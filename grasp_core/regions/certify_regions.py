@@ -14,8 +14,9 @@ import math
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.closure.closure_certificate import ClosureCertificate
 from grasp_core.closure.contacts import stacked
-from grasp_core.closure.force_closure import ClosureCertificate, force_closure
+from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import InputError, SolverError, UndecidedError
 from grasp_core.geometry.polygons import (
     SAME_CORNER,
@@ -39,7 +40,7 @@ from grasp_core.regions.growth import (
     largest_discs,
     shared_out,
 )
-from grasp_core.regions.proof import PLACE_SLACK, CertifiedRegions
+from grasp_core.regions.regions_certificate import PLACE_SLACK, CertifiedRegions
 from grasp_core.solvers.ties import coarse, on_grid
 from grasp_core.values import ContactRegion, Grasp, four
 

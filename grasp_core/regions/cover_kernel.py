@@ -1,9 +1,9 @@
 """Searches in compiled code for cones that cover all twists, with forces that resist each cone.
 
-`grasp_core.regions.proof` derives what is covered and why, and checks every answer; here cones are
-only divided and forces chosen. Numbers in comments refer to that derivation. Cones are divided
-level by level, the oldest first, so the answer is a tree in levels: for each cone the edge at which
-it is divided, or the forces.
+`grasp_core.regions.regions_certificate` derives what is covered and why, and checks every answer;
+here cones are only divided and forces chosen. Numbers in comments refer to that derivation. Cones
+are divided level by level, the oldest first, so the answer is a tree in levels: for each cone the
+edge at which it is divided, or the forces.
 
 A cone of twists is covered if contact forces together have power on all of its six rays. Such
 forces are found in rounds. In each round every ray has a weight, by how much power it has lacked so
@@ -23,11 +23,10 @@ import numpy as np
 from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import loop
 from grasp_core.regions.growth import LEAST_POWER, Sites
-from grasp_core.regions.proof import TWIST, UNDIVIDED
+from grasp_core.regions.regions_certificate import TWIST, UNDIVIDED
 
 TWIST_SIZE = 6
 MOST_PLACE_STEPS = 40
-"""Largest number of steps towards the place where a contact resists a twist least."""
 CONE_RAYS = TWIST
 FORCE_ROUNDS = 30  # of the choice of forces, at most
 ANSWERS = 3

@@ -7,8 +7,9 @@ for each attempt, then in smaller steps with as many cones as are allowed.
 
 A cover is a list of cones that fill the space of twists, each with contact forces that together
 have power on all its rays. Compiled code divides cones until such forces are found for each, or
-stops when it finds a twist that contacts at some places do not resist; `proof` derives why a cover
-is enough, and checks the answer, and `cover_kernel` describes how forces are found.
+stops when it finds a twist that contacts at some places do not resist; `regions_certificate`
+derives why a cover is enough, and checks the answer, and `cover_kernel` describes how forces are
+found.
 
 *Polygons.* A cover proves more than the discs it was sought for. On a ray of one of its cones the
 least powers of the forces sum to s > 0. Each of the m contacts with a force may lose s / m there
@@ -52,7 +53,14 @@ from grasp_core.geometry.polygons import (
     tidy,
 )
 from grasp_core.objects.face_pieces import FacePiece
-from grasp_core.regions.proof import TWIST, UNDIVIDED, TwistCover, power_of, slack_of, summed
+from grasp_core.regions.regions_certificate import (
+    TWIST,
+    UNDIVIDED,
+    TwistCover,
+    power_of,
+    slack_of,
+    summed,
+)
 from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
 from grasp_core.solvers.ties import GRID_DIGITS, coarse, first_best, nearest_optimum, on_grid
 

@@ -22,7 +22,6 @@ CONIC_RESIDUAL = 1e-7
 """Largest accepted violation, relative to the solution's size. Callers prove their own results from
 a solution, so this only catches answers that are plainly wrong."""
 REQUESTED = 1e-11
-"""Tolerance that Clarabel is asked for."""
 
 WAYS: tuple[tuple[str, float] | None, ...] = (
     None,

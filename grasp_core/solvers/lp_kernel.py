@@ -36,7 +36,6 @@ search ends at the box is left to another solver."""
 BEYOND_ROW = 1e-10
 """Distance beyond a row's plane at which a point violates the row."""
 LEAST_PIVOT = 1e-9
-"""Least alpha_j that may serve as a pivot."""
 MULTIPLIER_SLACK = 1e-10
 """Size below zero that multipliers may reach on the way."""
 NEGATIVE = 1e-13
@@ -213,7 +212,6 @@ def _corner(c: Array, count: int, vertex: Vertex) -> tuple[Array, float]:
 
 @loop("numpy", once=True)
 def _lengths(rows: LpRows) -> Array:
-    """Return the length of each row, or `LEAST_ROW`."""
     norms = np.zeros(len(rows.b))
     for i in range(len(rows.At)):
         for k in range(len(norms)):
@@ -264,7 +262,6 @@ def _blocking(column: Array, rows: LpRows, excess: Array, inside: NDArray[np.boo
 
 @loop("numpy", once=True)
 def _exceeded(x: Array, rows: LpRows, excess: Array) -> None:
-    """Fill in by how much x violates each row."""
     for k in range(len(excess)):
         excess[k] = -rows.b[k]
     for i in range(len(x)):

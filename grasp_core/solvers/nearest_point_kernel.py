@@ -32,9 +32,7 @@ INDEPENDENT_SHARE = 1e-9
 """Share of its length that a row must keep orthogonal to the active rows to be independent of them.
 """
 SMALLEST_DIVISOR = 1e-300
-"""Smallest length that is divided by."""
 NEAREST_STEPS = 20
-"""Largest number of steps per variable."""
 
 
 class Active(NamedTuple):

@@ -32,7 +32,6 @@ from grasp_core.errors import SolverError
 from grasp_core.kinds import one_of
 
 PROXQP = "proxqp"
-"""Name of the usual solver."""
 OPTIONS: dict[str, dict[str, Any]] = {
     PROXQP: {"eps_abs": 1e-8, "max_iter": 300, "primal_infeasibility_solving": True}
 }

@@ -38,8 +38,8 @@ from pydantic import Field, computed_field
 
 from grasp_core.arrays import Array
 from grasp_core.by_value import counted, summary
+from grasp_core.closure.closure_certificate import ClosureCertificate
 from grasp_core.closure.critical_friction import critical_friction
-from grasp_core.closure.force_closure import ClosureCertificate
 from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError, UndecidedError
 from grasp_core.families.free import of_general_type
@@ -56,7 +56,7 @@ from grasp_core.objects.polyhedron import UNITS_M, Polyhedron
 from grasp_core.objects.shells import SMALL_SHARE
 from grasp_core.planning.given_contacts import Seated, facets_of, grasp_of, nearest_like
 from grasp_core.planning.reach import Finger, reach
-from grasp_core.transferring.face_changes import (
+from grasp_core.transferring.part_comparison import (
     ANGLE_DEG,
     CHANGE_ROUNDING,
     FaceChange,
@@ -227,7 +227,7 @@ def transfer(
     """Carry grasps over to a part that has changed since they were planned, and judge them anew.
 
     Each contact goes to the nearest point of the changed part on a face whose normal is like its
-    own; the rules are in `grasp_core.transferring.face_changes`, the bands by which grasps are
+    own; the rules are in `grasp_core.transferring.part_comparison`, the bands by which grasps are
     compared in `grasp_core.transferring.transfer`.
 
     Args:

@@ -24,7 +24,7 @@ from grasp_core.kinds import FLAT, Count, FrictionOrZero, NotNegative, Number
 from grasp_core.objects.build import MeshChoices
 from grasp_core.objects.polyhedron import Polyhedron, polyhedron_from_mesh
 from grasp_core.objects.surface import Surface
-from grasp_core.records.grasps_json import RECORDED
+from grasp_core.planning.grasps_json import RECORDED
 from grasp_core.settings import Settings, extended
 from sim_validate.closure.verdict import Verdict
 from sim_validate.engine.setup import Agenda, Setup

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from grasp_core.files.records import record_of
-from grasp_core.records.grasps_json import load_grasps
+from grasp_core.planning.grasps_json import load_grasps
 from grasp_core.settings import extended
 from sim_validate.baselines import flags as baseline_flags
 from sim_validate.baselines.baseline import How, check_writable, read_baseline

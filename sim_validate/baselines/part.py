@@ -16,9 +16,9 @@ from grasp_core.files.text_files import read_bytes
 from grasp_core.mesh_files.limits import MESH_FORMATS
 from grasp_core.objects.on_faces import check_planar
 from grasp_core.objects.polyhedron import UNITS_M, Polyhedron, load_polyhedron
+from grasp_core.planning.grasps_json import RECORDED
 from grasp_core.planning.result import Plan
-from grasp_core.records.grasps_json import RECORDED
-from grasp_core.transferring.face_changes import (
+from grasp_core.transferring.part_comparison import (
     added_faces,
     changes_in_words,
     face_changes,

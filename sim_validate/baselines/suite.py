@@ -16,10 +16,10 @@ from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError, about
 from grasp_core.kinds import LARGEST_FRICTION, RandomWrenches, Repeats, Seed, Share, value_of
 from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron
+from grasp_core.planning.grasps_json import load_grasps
 from grasp_core.planning.planner import plan
 from grasp_core.planning.result import Plan
 from grasp_core.planning.settings import PlanSettings
-from grasp_core.records.grasps_json import load_grasps
 from grasp_core.settings import CHOSEN, Settings, for_users, named
 from grasp_core.values import Grasp
 from scenes.example_objects import example_object

@@ -20,15 +20,15 @@ from annotated_types import Len
 from pydantic import Field, computed_field
 
 from grasp_core.arrays import Array, Wrench, cross, rounded, to_digits
+from grasp_core.closure.closure_certificate import ClosureCertificate
 from grasp_core.closure.contacts import stacked
-from grasp_core.closure.force_closure import ClosureCertificate
 from grasp_core.declared import Declared, declared
 from grasp_core.errors import SolverError, UndecidedError
 from grasp_core.figures import Shown
 from grasp_core.files.records import UNRECORDED
-from grasp_core.forces.contact_forces import least_friction_forces
 from grasp_core.kinds import FLAT, Friction
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.quality.contact_forces import least_friction_forces
 from grasp_core.values import Contact, Grasp
 from scenes.mujoco.fingertip_room import clashes, fitting_radius
 from sim_validate.engine.rig import Rig, squeezed

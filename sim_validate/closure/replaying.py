@@ -20,8 +20,8 @@ from grasp_core.files.file_kinds import GRASPS, VERDICTS
 from grasp_core.files.records import UNRECORDED
 from grasp_core.kinds import FLAT, OrInfinity
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.planning.grasps_json import load_grasps
 from grasp_core.planning.result import Plan
-from grasp_core.records.grasps_json import load_grasps
 from grasp_core.values import Contact, Grasp
 from scenes.mujoco.closure_scene import Scene
 from scenes.mujoco.fingertip_room import clashes

@@ -10,7 +10,7 @@ from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import json_of
 from grasp_core.files.text_files import read_text
-from grasp_core.records.grasps_json import Overrides, contact_sets_from_json
+from grasp_core.planning.grasps_json import Overrides, contact_sets_from_json
 from grasp_core.values import FINGERS
 
 NO_FRICTION = 1.0

@@ -20,9 +20,9 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.closure.closure_certificate import ClosureCertificate
 from grasp_core.closure.contacts import contacts_sha256, stacked
 from grasp_core.closure.critical_friction import critical_friction
-from grasp_core.closure.force_closure import ClosureCertificate
 from grasp_core.cones.spanning import span_angle
 from grasp_core.errors import GraspError, InputError, NoForcesError, SolverError, UndecidedError
 from grasp_core.execution.best_squeeze import best_squeeze

@@ -19,8 +19,9 @@ import numpy as np
 from annotated_types import Interval, Len
 
 from grasp_core.arrays import Wrench, frozen_copy, to_digits
+from grasp_core.closure.closure_certificate import ClosureCertificate
 from grasp_core.closure.critical_friction import critical_friction
-from grasp_core.closure.force_closure import ClosureCertificate, force_closure
+from grasp_core.closure.force_closure import force_closure
 from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError, about
 from grasp_core.files.file_kinds import WRENCH_FILE

@@ -16,9 +16,9 @@ from grasp_core.errors import InputError, NoForcesError
 from grasp_core.figures import NONE, figures
 from grasp_core.files.text_files import write_text
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.planning.grasps_json import load_grasps
 from grasp_core.planning.reach import Finger
 from grasp_core.planning.result import Plan
-from grasp_core.records.grasps_json import load_grasps
 from grasp_core.settings import extended
 from grasp_core.stopping import never
 from grasp_core.values import Grasp

@@ -16,9 +16,10 @@ from numpy.typing import ArrayLike
 from pydantic import computed_field
 
 from grasp_core.arrays import Array, Shape, Wrench, to_digits
+from grasp_core.closure.closure_certificate import FAR_BELOW, ClosureCertificate
 from grasp_core.closure.contacts import contact_torsions
 from grasp_core.closure.critical_friction import critical_friction, critical_friction_interval
-from grasp_core.closure.force_closure import FAR_BELOW, ClosureCertificate, force_closure
+from grasp_core.closure.force_closure import force_closure
 from grasp_core.closure.friction_interval import FrictionInterval
 from grasp_core.closure.wrench_sets import Norm
 from grasp_core.declared import Declared, declared
@@ -26,12 +27,12 @@ from grasp_core.errors import InputError, NoForcesError, SolverError, UndecidedE
 from grasp_core.figures import NONE, Shown, cell, figures
 from grasp_core.files.file_kinds import ANALYSES
 from grasp_core.files.text_files import read_text
-from grasp_core.forces.contact_forces import contact_forces
 from grasp_core.kinds import FLAT, Count, Null, OrInfinity, Quantity, Share
+from grasp_core.planning.grasps_json import ContactSet, Overrides, contact_sets_from_json
+from grasp_core.quality.contact_forces import contact_forces
 from grasp_core.quality.ferrari_canny import FerrariCanny, ferrari_canny
 from grasp_core.quality.metrics import hull_volume, min_weight, smallest_singular_value
 from grasp_core.quality.wrench_limits import axis_wrenches, wrench_limits
-from grasp_core.records.grasps_json import ContactSet, Overrides, contact_sets_from_json
 from grasp_core.solvers.ties import first_best
 from sim_validate.commands import flags
 from sim_validate.commands.console import TABLE_ROWS, Reporter
@@ -447,6 +448,5 @@ def _proved(lower: float, upper: float) -> tuple[str, str]:
 
 
 def _listed(values: Array) -> str:
-    """Print a vector, or several of them."""
     rows = np.atleast_2d(to_digits(values) + 0.0).tolist()
     return "; ".join(", ".join(f"{value:.4g}" for value in row) for row in rows)

@@ -7,16 +7,15 @@ from pathlib import Path
 from grasp_core.errors import InputError
 from grasp_core.mesh_files.limits import MESH_FORMATS, MeshLimits
 from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron
+from grasp_core.planning.grasps_json import load_grasps
 from grasp_core.planning.reach import Finger
 from grasp_core.planning.result import Plan
-from grasp_core.records.grasps_json import load_grasps
 from grasp_core.values import Grasp
 from scenes.example_objects import example_object
 from sim_validate.commands import flags
 from sim_validate.commands.console import Reporter
 
 NAMES_LISTED = 5
-"""Largest number of names that a message lists."""
 
 
 def is_mesh_file(name: str) -> bool:

@@ -153,7 +153,6 @@ WHY = {
     "interrupt": "it was interrupted",
     "undivided": "what is left of the faces is too small, or too much, to be divided further",
 }
-"""Why a search ended, in words."""
 PLANNED_GAP = 1e-3
 """Gap between the bounds of what planned grasps hold."""
 

@@ -22,11 +22,11 @@ from grasp_core.files.text_files import write_text
 from grasp_core.names import METHODS, RankBy
 from grasp_core.objects.on_faces import nearest_edge
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.planning.grasps_json import plan_to_json
 from grasp_core.planning.plan_search import carried, chosen
 from grasp_core.planning.planner import put_together, search_grasps
 from grasp_core.planning.result import Moved, Plan, PlanRequest, methods_for
 from grasp_core.planning.settings import PlanSettings
-from grasp_core.records.grasps_json import plan_to_json
 from grasp_core.settings import types
 from grasp_core.stopping import Stop
 from grasp_core.values import Grasp

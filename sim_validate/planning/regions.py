@@ -31,7 +31,7 @@ from grasp_core.objects.face_pieces import inscribed_radius
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.regions.certify_placement import misplacement, placement_bound
 from grasp_core.regions.certify_regions import certify_regions
-from grasp_core.regions.proof import CertifiedRegions, TwistCover
+from grasp_core.regions.regions_certificate import CertifiedRegions, TwistCover
 from grasp_core.stopping import Stop
 from grasp_core.values import FINGERS, ContactRegion, Grasp, four
 from sim_validate.commands import simulation_flags
@@ -58,7 +58,6 @@ FIELDS: Mapping[str, str] = {
 """Name of the array in a proof file for fields of `CertifiedRegions`."""
 ARRAYS = ("axes", "codes", "forces", *FIELDS.values(), *POLYGONS, *BORDERS)
 MOST_REGION_CORNERS = 1000
-"""Largest number of corners of a region's polygon in a file."""
 SMALLEST_SCALE, LARGEST_SCALE = 1e-6, 1e6
 """Smallest and largest unit of length of a proof, and largest coordinate in it [m]."""
 

@@ -15,8 +15,8 @@ from grasp_core.mesh_files.limits import MeshChoices
 from grasp_core.messages import MILLI
 from grasp_core.objects.on_faces import check_planar
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.planning.grasps_json import plan_to_json
 from grasp_core.planning.result import Outcomes, Plan, PlanCounts
-from grasp_core.records.grasps_json import plan_to_json
 from grasp_core.settings import extended
 from grasp_core.transferring.transfer import (
     CHANGES,

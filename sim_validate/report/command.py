@@ -17,9 +17,9 @@ from grasp_core.files.file_kinds import GRASPS, MANIFEST
 from grasp_core.files.records import record_of
 from grasp_core.files.text_files import write_text
 from grasp_core.messages import MICRO
+from grasp_core.planning.grasps_json import load_grasps
 from grasp_core.planning.result import Plan
 from grasp_core.provenance import versions
-from grasp_core.records.grasps_json import load_grasps
 from grasp_core.values import Grasp
 from scenes.drawing.clips import GraphicsError, has_display, write_clip, write_trial_clip
 from scenes.drawing.pages import turntable_page

@@ -10,8 +10,8 @@ from grasp_core.errors import InputError
 from grasp_core.files.file_kinds import GRASPS, REACHES
 from grasp_core.files.records import RecordFile
 from grasp_core.grasp_tables import ById, Named
+from grasp_core.planning.grasps_json import load_grasps
 from grasp_core.planning.result import Plan
-from grasp_core.records.grasps_json import load_grasps
 from grasp_core.values import Grasp
 from scenes.drawing.hands import PosedHand, posed_hand
 from sim_validate.closure.verdict import Verdict, Verdicts

@@ -43,7 +43,7 @@ class FileKind(NamedTuple):
 
 
 FILE_KINDS: Mapping[str, FileKind] = {
-    "grasps": FileKind(files.GRASPS, "grasp_core.records.grasps_json:GraspsFile"),
+    "grasps": FileKind(files.GRASPS, "grasp_core.planning.grasps_json:GraspsFile"),
     "best": FileKind(files.BEST, "sim_validate.planning.best:Best"),
     "transfer": FileKind(files.TRANSFER, "sim_validate.planning.transfer:TransferFile"),
     "verdicts": FileKind(files.VERDICTS, "sim_validate.closure.verdict:Verdicts"),
@@ -58,7 +58,7 @@ FILE_KINDS: Mapping[str, FileKind] = {
     "baseline": FileKind(files.BASELINE, "sim_validate.baselines.baseline:Baseline"),
     "analyses": FileKind(files.ANALYSES, "sim_validate.planning.analyze:Analyses"),
     "wrenches": FileKind(files.WRENCH_FILE, "sim_validate.engine.setup:WrenchFile"),
-    "contacts": FileKind(files.CONTACTS_FILE, "grasp_core.records.grasps_json:ContactsFile"),
+    "contacts": FileKind(files.CONTACTS_FILE, "grasp_core.planning.grasps_json:ContactsFile"),
     "dataset": FileKind("configuration of a dataset, TOML",
                         "sim_validate.datasets.config:DatasetConfig", True),
     "setup": FileKind("setup of the simulation, TOML", "sim_validate.engine.setup:Setup", True),

@@ -11,11 +11,11 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 import grasp_core as gc
-from grasp_core.families.absence import Absence
+from grasp_core.families.absence_certificate import Absence
 from grasp_core.geometry import polygons as flat_polygons
 from grasp_core.optimizing.better_contacts import pieces_under
-from grasp_core.regions import proof as covers
-from grasp_core.regions.proof import CertifiedRegions
+from grasp_core.regions import regions_certificate as covers
+from grasp_core.regions.regions_certificate import CertifiedRegions
 from tests.attacks.searching import Attack, always, power
 from tests.grasp_core.exact_judges import open_exactly
 from tests.tampering import on_planes, table

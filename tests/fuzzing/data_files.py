@@ -11,9 +11,9 @@ from typing import Any
 import grasp_core as gc
 from grasp_core.files.records import RecordFile, entries, record_of
 from grasp_core.files.text_files import text_of
+from grasp_core.planning import grasps_json
 from grasp_core.planning.planner import plan
 from grasp_core.planning.result import Plan
-from grasp_core.records import grasps_json
 from scenes.example_objects import example_object
 from sim_validate.baselines.baseline import Baseline
 from sim_validate.baselines.suite import suite_from_tables

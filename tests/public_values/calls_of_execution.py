@@ -8,7 +8,7 @@ import numpy as np
 import grasp_core as gc
 import scenes
 import sim_validate as sv
-from grasp_core.forces.contact_forces import even_forces
+from grasp_core.quality.contact_forces import even_forces
 from sim_validate.hands.trials import cube, hinged_hand, stance
 from tests.public_values.bad_values import (
     AT_LEAST_ONE,

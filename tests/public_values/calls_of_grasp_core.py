@@ -86,9 +86,9 @@ CALLS = [
     }),
     Call("gc.iter_grasps", lambda: {"body": body()}, PLANNED),
     Call("gc.save_grasps", lambda: {"path": "grasps.json", "plan": gc.plan(body(), limit=1)},
-         succeeds_in="tests/grasp_core/records/test_grasps_files.py"),
+         succeeds_in="tests/grasp_core/planning/test_grasps_files.py"),
     reading("gc.load_grasps", "no/such/grasps.json",
-            "tests/grasp_core/records/test_grasps_files.py"),
+            "tests/grasp_core/planning/test_grasps_files.py"),
     Call("gc.force_closure", two_arrays(friction=0.5), contacts() | {
         "friction": each_of(FRICTION, "zero", "tiny"),
     }),

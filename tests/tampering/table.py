@@ -14,7 +14,7 @@ import grasp_core as gc
 import scenes
 from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.execution.carried_mass import CarryingHand, carried_mass
-from grasp_core.families.absence import Absence
+from grasp_core.families.absence_certificate import Absence
 from grasp_core.families.free import place_free
 from grasp_core.objects.face_pieces import unit_pieces
 from grasp_core.quality.measures import Measure, resisted_loads

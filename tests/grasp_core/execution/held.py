@@ -6,7 +6,7 @@ import numpy as np
 
 import grasp_core as gc
 import scenes
-from grasp_core.forces.contact_forces import even_forces
+from grasp_core.quality.contact_forces import even_forces
 
 HALF, ASIDE = 0.03, 0.02
 

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.closure.force_closure import ClosureCertificate
+from grasp_core.closure.closure_certificate import ClosureCertificate
 from grasp_core.families import free
-from grasp_core.families.absence import Absence, part_at
+from grasp_core.families.absence_certificate import Absence, part_at
 from grasp_core.families.free import Undecided, close_patch, place_by_forces, place_free
 from grasp_core.families.placements import Placement
 from grasp_core.objects.booleans import extrusion

@@ -5,7 +5,7 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.objects.on_faces import check_on_faces, face_under
-from grasp_core.records.grasps_json import grasps_from_json, plan_to_json
+from grasp_core.planning.grasps_json import grasps_from_json, plan_to_json
 from tests.grasp_core.curved import curved_body, inside, met
 
 FRICTION = 0.5

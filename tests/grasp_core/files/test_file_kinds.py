@@ -10,8 +10,8 @@ from grasp_core.files import file_kinds
 from grasp_core.files.file_kinds import BESIDE, CONTACTS_FILE, GIVEN, GRASPS, WRITTEN, kind_of
 from grasp_core.files.json_text import object_of
 from grasp_core.files.records import RecordFile, keys
+from grasp_core.planning.grasps_json import ContactsFile, contact_sets_from_json
 from grasp_core.planning.result import Plan
-from grasp_core.records.grasps_json import ContactsFile, contact_sets_from_json
 from sim_validate.baselines.baseline import Baseline
 from sim_validate.closure.verdict import Verdicts
 from sim_validate.datasets.manifest import Manifest

@@ -4,7 +4,7 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.optimizing.better_contacts import pieces_under
-from grasp_core.records.grasps_json import grasps_from_json, plan_to_json
+from grasp_core.planning.grasps_json import grasps_from_json, plan_to_json
 from scenes.example_objects import example_object
 
 

@@ -15,7 +15,7 @@ from grasp_core.objects.on_faces import within
 from grasp_core.regions import certify_regions as module
 from grasp_core.regions.certify_regions import certify_regions
 from grasp_core.regions.growth import Sites, search_cover
-from grasp_core.regions.proof import CertifiedRegions
+from grasp_core.regions.regions_certificate import CertifiedRegions
 from sim_validate.planning.regions import area_of
 from tests.grasp_core.curved import curved_body, inside, met
 

@@ -9,8 +9,8 @@ import trimesh
 
 import grasp_core as gc
 from grasp_core.objects.on_faces import check_on_faces
-from grasp_core.records.grasps_json import grasps_from_json, plan_to_json
-from grasp_core.transferring.face_changes import face_changes, likeness
+from grasp_core.planning.grasps_json import grasps_from_json, plan_to_json
+from grasp_core.transferring.part_comparison import face_changes, likeness
 from grasp_core.transferring.transfer import (
     FRICTION_BAND,
     QUALITY_BAND,

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 import grasp_core as gc
 import scenes
-from grasp_core.forces.contact_forces import even_forces
+from grasp_core.quality.contact_forces import even_forces
 from scenes.drawing import clips
 from scenes.drawing.clips import (
     MOST_ENLARGED,

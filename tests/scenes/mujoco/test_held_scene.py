@@ -9,7 +9,7 @@ import pytest
 
 import grasp_core as gc
 import scenes
-from grasp_core.forces.contact_forces import even_forces
+from grasp_core.quality.contact_forces import even_forces
 from scenes.mujoco.held_scene import gravity_of, held_physics
 from scenes.mujoco.scene_text import FINGERTIP_BIT, TABLE_BIT
 from tests.scenes.mujoco.compiled import compiled, state_of

@@ -8,8 +8,8 @@ import pytest
 
 import grasp_core as gc
 import sim_validate as sv
-from grasp_core.records.grasps_json import grasps_from_json
-from grasp_core.regions.proof import TwistCover
+from grasp_core.planning.grasps_json import grasps_from_json
+from grasp_core.regions.regions_certificate import TwistCover
 from scenes.example_objects import example_object
 from sim_validate.commands.exit_codes import Exit
 from sim_validate.main import main

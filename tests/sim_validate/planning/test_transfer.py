@@ -7,7 +7,7 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.files.text_files import write_text
-from grasp_core.records.grasps_json import load_grasps
+from grasp_core.planning.grasps_json import load_grasps
 from scenes.example_objects import example_object
 from sim_validate.commands.exit_codes import Exit
 from sim_validate.main import main

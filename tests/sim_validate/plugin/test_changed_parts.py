@@ -10,7 +10,7 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.files.text_files import write_text
-from grasp_core.records.grasps_json import grasps_from_json, plan_to_json
+from grasp_core.planning.grasps_json import grasps_from_json, plan_to_json
 from scenes.example_objects import example_object
 from sim_validate.baselines.compare import Status
 from sim_validate.baselines.part import ChangedPartError, SourceMesh, source_of

@@ -3,7 +3,7 @@
 import re
 
 from grasp_core.files.text_files import write_text
-from grasp_core.records.grasps_json import grasps_from_json
+from grasp_core.planning.grasps_json import grasps_from_json
 from tests.sim_validate.plugin.project import copied, properties_in, run_pytest
 
 MARKED = """

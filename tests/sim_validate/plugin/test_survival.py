@@ -7,7 +7,7 @@ import pytest
 
 import sim_validate as sv
 from grasp_core.files.text_files import write_text
-from grasp_core.records.grasps_json import load_grasps
+from grasp_core.planning.grasps_json import load_grasps
 from tests.sim_validate.plugin.project import properties_in, run_pytest
 from tests.sim_validate.rigs import saved_plan
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 import sim_validate as sv
-from grasp_core.records.grasps_json import load_grasps
+from grasp_core.planning.grasps_json import load_grasps
 from sim_validate.closure.verdict import Verdicts
 from sim_validate.commands.exit_codes import Exit
 from sim_validate.main import main

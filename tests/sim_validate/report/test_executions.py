@@ -12,7 +12,7 @@ import sim_validate as sv
 from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.errors import InputError
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
-from grasp_core.records.grasps_json import load_grasps
+from grasp_core.planning.grasps_json import load_grasps
 from scenes.mujoco_options import PhysicsSettings
 from sim_validate.commands.exit_codes import Exit
 from sim_validate.engine.traces import Outcome

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from grasp_core.errors import InputError
-from grasp_core.records.grasps_json import load_grasps
+from grasp_core.planning.grasps_json import load_grasps
 from sim_validate.closure.verdict import Verdicts
 from sim_validate.commands.exit_codes import Exit
 from sim_validate.main import main

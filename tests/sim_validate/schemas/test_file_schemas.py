@@ -11,7 +11,7 @@ import scenes
 from grasp_core.errors import InputError
 from grasp_core.figures import meanings
 from grasp_core.files import file_kinds
-from grasp_core.records.grasps_json import ContactSet
+from grasp_core.planning.grasps_json import ContactSet
 from sim_validate.baselines.suite import suite_from_tables
 from sim_validate.commands.console import Reporter
 from sim_validate.commands.flags import SchemaFlags

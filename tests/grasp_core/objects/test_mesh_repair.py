@@ -10,7 +10,7 @@ import trimesh
 import grasp_core as gc
 from grasp_core.errors import MeshRefusal
 from grasp_core.objects.booleans import Solid
-from grasp_core.objects.build import caps_of
+from grasp_core.objects.mesh_repair import caps_of
 from grasp_core.objects.surface import Mesh, MeshEdges
 from tests.bad_input import mesh_texts
 

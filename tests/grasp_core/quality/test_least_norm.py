@@ -9,8 +9,8 @@ from scipy.optimize import nnls
 from grasp_core.closure.contacts import contact_frames, grasp_map
 from grasp_core.cones.pyramids import PYRAMID_SIDES
 from grasp_core.errors import NoForcesError
-from grasp_core.forces.contact_forces import balances, contact_forces, least_norm_in_cones
-from tests.grasp_core.forces.loads import (
+from grasp_core.quality.contact_forces import balances, contact_forces, least_norm_in_cones
+from tests.grasp_core.quality.loads import (
     ALL_LIMITS,
     INSCRIBED,
     balanced_wrenches,

@@ -52,7 +52,7 @@ import numpy as np
 from annotated_types import Interval
 
 from grasp_core.arrays import Amount, Array, Indices, Point, Polygon, Shape, Wrench, is_array
-from grasp_core.closure.force_closure import ClosureCertificate
+from grasp_core.closure.closure_certificate import ClosureCertificate
 from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError
 from grasp_core.geometry.polygons import (

@@ -192,7 +192,6 @@ MOST_GRASPS = 100_000
 LARGEST_LENGTH_M = 1e6
 """Largest length [m]: longer ones are mistakes, and their squares might overflow."""
 LONGEST_ID = 100
-"""Largest number of letters of the id of a grasp."""
 NEARLY_UNIT = 1e-3
 """How far the length of a normal may be from 1: rounding of a file with three digits."""
 UNIT_ROUNDING = 1e-15

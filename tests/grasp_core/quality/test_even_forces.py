@@ -5,8 +5,8 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.closure.contacts import normal_and_tangential
-from grasp_core.forces.contact_forces import even_forces
-from tests.grasp_core.forces.loads import closed_just_so
+from grasp_core.quality.contact_forces import even_forces
+from tests.grasp_core.quality.loads import closed_just_so
 
 CUBE = np.array([[1.0, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]])
 

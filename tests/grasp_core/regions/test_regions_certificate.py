@@ -10,7 +10,7 @@ import pytest
 import grasp_core as gc
 import scenes
 from grasp_core.regions.certify_regions import certify_regions
-from grasp_core.regions.proof import EDGES, UNDIVIDED, TwistCover
+from grasp_core.regions.regions_certificate import EDGES, UNDIVIDED, TwistCover
 from tests.grasp_core.exact_judges import exactly
 
 SMALL = 1_000

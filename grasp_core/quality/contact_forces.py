@@ -62,7 +62,6 @@ FINE_RESIDUAL = 1e-9
 CLEARLY = 1.01
 """Factor by which a wrench must exceed all forces, so that rounding does not matter."""
 NO_FORCE = 1e-100
-"""Smallest normal force that is divided by: a contact may have no force."""
 KEPT_BACK = 1e-7
 """Share of the friction that is not used in cones, to cover the errors of the solver."""
 REGULAR = 1e-3

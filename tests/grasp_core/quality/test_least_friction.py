@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from grasp_core.closure.contacts import normal_and_tangential
-from grasp_core.forces.contact_forces import contact_forces, least_friction_forces
+from grasp_core.quality.contact_forces import contact_forces, least_friction_forces
 from grasp_core.quality.wrench_limits import WrenchBody, limit_of
-from tests.grasp_core.forces.loads import LIMITS, SLACK, balanced_wrenches
+from tests.grasp_core.quality.loads import LIMITS, SLACK, balanced_wrenches
 from tests.judges import random_contacts
 
 

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
+from grasp_core.planning.grasps_json import RecordedObject, grasps_from_json, plan_to_json
 from grasp_core.planning.result import Plan
-from grasp_core.records.grasps_json import RecordedObject, grasps_from_json, plan_to_json
 from scenes.example_objects import example_object
 from tests.damaged import check_refused, optional_keys, value_at
 

@@ -3,7 +3,7 @@ import json
 import pytest
 
 import grasp_core as gc
-from grasp_core.records.grasps_json import ContactsFile, contact_sets_from_json
+from grasp_core.planning.grasps_json import ContactsFile, contact_sets_from_json
 from tests.damaged import check_refused, optional_keys
 from tests.judges import TETRA_CENTERS, TETRA_NORMALS
 

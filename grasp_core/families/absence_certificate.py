@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.closure.force_closure import ClosureCertificate
+from grasp_core.closure.closure_certificate import ClosureCertificate
 from grasp_core.declared import Declared, declared
 from grasp_core.geometry.polygons import clip
 from grasp_core.kinds import FrictionOrZero

@@ -6,8 +6,8 @@ import pytest
 import grasp_core as gc
 from grasp_core.closure.contacts import grasp_map, normal_and_tangential
 from grasp_core.errors import NoForcesError
-from grasp_core.forces.contact_forces import contact_forces
-from tests.grasp_core.forces.loads import LIMITS, SLACK, balanced_wrenches, batches, closed_just_so
+from grasp_core.quality.contact_forces import contact_forces
+from tests.grasp_core.quality.loads import LIMITS, SLACK, balanced_wrenches, batches, closed_just_so
 from tests.judges import TETRA_CENTERS, TETRA_NORMALS, random_contacts
 
 

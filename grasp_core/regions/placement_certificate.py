@@ -11,7 +11,7 @@ the normal n'_i = R n_i, and the finger meets its plane at
     x_i + e_i + s_i n_i,    s_i = (n_i.d_i - n'_i.(d_i + e_i - t)) / n_i.n'_i.              (1)
 
 However far the object moves, a contact stays on its finger's line. It slides along that line, and
-its normal turns by at most |w|. So a cover (`proof`) over the prisms
+its normal turns by at most |w|. So a cover (`regions_certificate`) over the prisms
 
     K_i = {x_i + e + s n_i :  |e| <= E, |s| <= S_i}  with normals n_i and friction m          (2)
 
@@ -65,19 +65,16 @@ from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError
 from grasp_core.geometry.polygons import circle, convex_polygon, plane_frame
 from grasp_core.kinds import Friction, NotNegative, Share
-from grasp_core.regions.proof import PLACE_SLACK, TwistCover
+from grasp_core.regions.regions_certificate import PLACE_SLACK, TwistCover
 from grasp_core.values import FINGERS
 
 ESTIMATE_DRAWS = 2000
-"""Number of draws of an estimate."""
 ROUNDING_CHANCE = 1e-9
-"""Chance that pays for rounding."""
 LARGEST_DEVIATIONS = 4.5
 """Largest motions that count, in their largest deviations: a chance of 1.5e-4 for each of t, w."""
 LARGEST_CLOSED_TURN = 1.0
 """Largest turn that may count as closed [rad]."""
 DISC_SIDES = 16
-"""Corners of the polygons around discs of fingers' shifts."""
 TAIL_CHANCES = np.append(np.exp2(np.arange(-1.0, -160.0, -1.0) / 4.0), 0.0)
 """Chances of values above the ends of the intervals that a law is divided into."""
 MASS = -np.diff(TAIL_CHANCES, prepend=1.0)

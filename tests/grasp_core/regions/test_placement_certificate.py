@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 import grasp_core as gc
 from grasp_core.geometry.polygons import plane_frame
 from grasp_core.planning.given_contacts import grasp_of, seat
-from grasp_core.regions.placement import LARGEST_DEVIATIONS, _chances_beyond, _limits
+from grasp_core.regions.placement_certificate import LARGEST_DEVIATIONS, _chances_beyond, _limits
 from scenes import example_object
 from tests.placements import met, share_closed
 
