@@ -62,7 +62,6 @@ NUMBER_RADII = 2.9
 """Distance of a finger's number from its contact, through the middle of the fingertip, in the
 fingertip's radii."""
 HAND_ELEVATIONS = (18, 28, 40, 0, -18, -28, -40)
-"""Elevations of the views to choose from [deg]; of equally good ones the first is taken."""
 HIDDEN = 4.0
 """Fault of a view in which the hand hides all contacts."""
 FAULT_BEHIND = 1.0

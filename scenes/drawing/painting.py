@@ -47,7 +47,6 @@ from scenes.drawing.sheets import (
 VIEW_RADII = 9.0
 """Distance of the camera, in object radii: perspective is visible, and distortion is small."""
 AZIMUTHS, VIEW_ELEVATIONS = range(5, 360, 10), (18, 28, 40)
-"""Azimuths and elevations of the views to choose from [deg]."""
 EDGE_ON_COSINE = 0.12
 """Cosine of the angle between a face's normal and the line of sight below which the face is seen
 nearly as a line."""
@@ -479,7 +478,6 @@ def _cone(shape: Drawable, look: RoleLook, window: Window) -> Iterator[Near]:
 FILLED: dict[Role, Callable[[Drawable, RoleLook, Window], Iterator[Near]]] = {
     "object": _glass, "force cone": _cone,
 }  # fmt: skip
-"""How areas of some roles are drawn, other than each on its own."""
 
 
 def _normals(polygons: Sequence[Array]) -> Array:

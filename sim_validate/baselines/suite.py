@@ -183,7 +183,6 @@ def suite_from_tables(given: Mapping[str, Any], path: Path) -> Suite:
 
 USUAL_FRICTION = 0.5
 TRIALS = ("wrenches", "repeats", "noise", "random_wrenches", "seed")
-"""Settings of an agenda that a test may give by their names."""
 PLAN_SETTINGS = ("object", "friction", "limit", "families", "cones", "seed", "unit", "scale")
 
 

@@ -15,7 +15,6 @@ from grasp_core.settings import types
 from sim_validate.commands.flags import BARE
 
 REGISTRY: Any = ConstructorRegistry()
-"""How values of types that the parser of flags does not know are read."""
 
 
 @dataclass(frozen=True, slots=True)

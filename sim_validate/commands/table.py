@@ -121,7 +121,6 @@ GROUPS: Mapping[str, str] = {
         "Record simulation results of grasps, and notice later when their stability changes."
     ),
 }
-"""What commands have in common whose names begin with one word."""
 EXAMPLES = """\
 run wedge
 run part.stl --unit mm --friction 0.3 --limit 20 --limits ramp --out results

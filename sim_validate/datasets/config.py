@@ -54,7 +54,6 @@ def id_beginning(object_id: str, friction: float) -> str:
 
 EXECUTING = "execution"
 LEARNING = "learning"
-"""Names of the tables in a settings file."""
 BuiltInHand: TypeAlias = Literal["", "allegro", "allegro-urdf", "leap"]
 FigureGroup: TypeAlias = Literal["closure", "least_squeeze", "placement"]
 CONTROL_KINDS = 5
@@ -62,7 +61,6 @@ CONTROL_KINDS = 5
 CREDITS = ("title", "license", "creator", "url", "published")
 """Settings that only inform people; no row depends on them."""
 Varied = Annotated[int, Interval(ge=0, le=100)]
-"""A number of rows of one kind that are made from a grasp."""
 
 
 @declared

@@ -71,7 +71,7 @@ class Staging:
         """Keep the rows and files of a finished unit."""
         kinds = dataset_tables(unit.config.groups)
         tables = {
-            _file(name): parquet_bytes(name, made.rows.cells(name, columns), kinds)
+            f"{name}.parquet": parquet_bytes(name, made.rows.cells(name, columns), kinds)
             for name, columns in kinds.items()
         }
         others = {f"{OTHER_FILES}/{path}": text.encode() for path, text in made.files.items()}
@@ -106,7 +106,7 @@ class Staging:
 
     def table(self, unit: WorkUnit, name: Name) -> Path:
         """Return the path of a finished unit's rows in one of the tables."""
-        return self.of(unit) / _file(name)
+        return self.of(unit) / f"{name}.parquet"
 
     def of(self, unit: WorkUnit) -> Path:
         """Return the folder of a finished unit, with its rows or the reason why it has none."""
@@ -121,10 +121,6 @@ class Staging:
         except (OSError, InputError):
             if not self.done(unit):  # otherwise another attempt was faster and wrote the same rows
                 raise
-
-
-def _file(name: Name) -> str:
-    return f"{name}.parquet"
 
 
 def _kept(path: Path, data: bytes) -> Path:

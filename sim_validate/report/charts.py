@@ -349,7 +349,6 @@ def _hatched(panel: Panel, radius: float) -> list[Mark]:
 MOTION_SIZE = 300.0, 316.0
 TIME = "time since friction was lowered [s]"
 MOTION_PLACE = (50.0, 28.0, 236.0, 180.0)
-"""Left and upper border of what a panel draws in, its width and its height [pixels]."""
 KEY = 3.0 * ROW + 6.0
 SLIP_NAME = (1.0, "slips")
 """Share of its friction that a finger uses when it slips, and its name."""
@@ -361,7 +360,6 @@ LEAST_PUSH = 1e-3
 """Share of a finger's largest push below which its use of friction is not shown."""
 PAIRS_SIZE = 360.0, 388.0
 PAIRS_PLACE = (70.0, 28.0, 280.0, 280.0)
-"""Left and upper border of what a panel draws in, its width and its height [pixels]."""
 LEAST_SHOWN = 0.5
 """Place of zero on a logarithmic axis, relative to the least value above zero."""
 

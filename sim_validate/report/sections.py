@@ -45,7 +45,6 @@ REASONS = {
     "no closure": "no three contacts close",
 }
 EXECUTION_FIGURES: Sequence[Figure] = figures(ExecutedGrasp)[1:]
-"""Figures of executed grasps, but for the id, which leads to a grasp's page."""
 FINGERS_MEANING = "that touch at the grasp's contacts, by finger of the grasp"
 HAND_TITLE_FIGURES = ("grasp", "id")
 ALWAYS = ("mass_kg", "seed")
