@@ -72,7 +72,10 @@ def _parsed(arguments: list[str]) -> tuple[str, "Spoken"]:
 
     The parser exits where help is asked for, or a flag is unknown.
     """
-    _check_working_folder()
+    try:
+        Path.cwd()
+    except OSError as error:  # nor could loops be compiled there
+        raise InputError("the working folder is gone; change to one that exists") from error
     if "" in arguments:
         said = "an argument is empty, perhaps from a variable that is not set"
         raise FlagsError(f"{said}; leave the argument out, or give it a value")
@@ -101,13 +104,6 @@ def _parsed(arguments: list[str]) -> tuple[str, "Spoken"]:
         raise FlagsError(f"{flag} {error.fault}") from error
     except InputError as error:  # settings that do not fit each other
         raise FlagsError(str(error)) from error
-
-
-def _check_working_folder() -> None:
-    try:
-        Path.cwd()
-    except OSError as error:  # nor could loops be compiled there
-        raise InputError("the working folder is gone; change to one that exists") from error
 
 
 def _command_of(words: Sequence[str]) -> str:
