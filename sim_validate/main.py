@@ -72,7 +72,10 @@ def _parsed(arguments: list[str]) -> tuple[str, "Spoken"]:
 
     The parser exits where help is asked for, or a flag is unknown.
     """
-    _check_working_folder()
+    try:
+        Path.cwd()
+    except OSError as error:  # nor could loops be compiled there
+        raise InputError("the working folder is gone; change to one that exists") from error
     if "" in arguments:
         said = "an argument is empty, perhaps from a variable that is not set"
         raise FlagsError(f"{said}; leave the argument out, or give it a value")
@@ -116,13 +119,6 @@ def _config_of(arguments: list[str]) -> tuple[Path | None, list[str]]:
     if at + 1 >= len(words):
         raise FlagsError("--config needs the path of a TOML file after it")
     return Path(words[at + 1]), words[:at] + words[at + 2 :]
-
-
-def _check_working_folder() -> None:
-    try:
-        Path.cwd()
-    except OSError as error:  # nor could loops be compiled there
-        raise InputError("the working folder is gone; change to one that exists") from error
 
 
 def _command_of(words: Sequence[str]) -> str:

@@ -71,19 +71,6 @@ def state_parts(model: mujoco.MjModel) -> dict[str, slice]:
     return found
 
 
-def step(
-    trials: batch.Batch, errors: dict[int, str], steps: int, going: Indices | None = None
-) -> None:
-    """Step trials (all, or those given by index), except those that an error ended."""
-    running = going
-    if errors:
-        running = np.setdiff1d(np.arange(trials.nsim) if going is None else going, list(errors))
-    try:
-        trials.step(running, nstep=steps)
-    except batch.SimulationError as failure:
-        errors.update({int(trial): trials.error(int(trial)) for trial in failure.ids})
-
-
 @dataclass(frozen=True, slots=True)
 class Health:
     """Whether the simulator did what it was told in a trial."""
@@ -249,7 +236,11 @@ class Bench(Generic[AnyScene]):
                     rows, at, to = slice(count), now[0], to[0]
                 for view, values in told:
                     view[rows] = values[rows, at]
-                step(sims, errors, self.chunk, going)
+                running = np.setdiff1d(going, list(errors)) if errors else going
+                try:
+                    sims.step(running, nstep=self.chunk)
+                except batch.SimulationError as failure:
+                    errors.update({int(trial): sims.error(int(trial)) for trial in failure.ids})
                 for view, found in read:
                     found[rows, to] = view[rows]
                 counts[going] += 1
