@@ -397,7 +397,7 @@ def load_hand(name: str) -> Hand:
 
     Args:
         name: "allegro", "allegro-urdf" (the same with fingertips as in the maker's URDF) or "leap";
-            `scenes.load_hand` also reads files.
+            `scenes.hand_from_file` reads others.
 
     Raises:
         InputError: There is no such hand.
@@ -405,7 +405,7 @@ def load_hand(name: str) -> Hand:
     if value_of(str, name, "name") not in HANDS:
         raise InputError(
             f"name must be that of a built-in hand, {' or '.join(HANDS)}, got {shown(name)}; "
-            "scenes.load_hand(path, fingertips=...) reads files"
+            "scenes.hand_from_file(path, fingertips) reads others"
         )
     found = read_text(Path(__file__).with_name(f"{name}.json"))
     return from_record(Hand, object_of(found, "hand"))

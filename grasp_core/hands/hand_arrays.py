@@ -22,6 +22,7 @@ from grasp_core.compiled import compiled
 from grasp_core.errors import InputError
 from grasp_core.frames import POSE
 from grasp_core.hands.hand import PALM, SAME, Hand, HandFinger, LinkShape
+from grasp_core.kinds import Direction, value_of
 
 _Part: TypeAlias = tuple[int, LinkShape]  # a shape with the number of its link
 LEAST_BALL = 0.008
@@ -311,6 +312,12 @@ def tip_jacobians(hand: Hand, joints: ArrayLike, palm_pose: ArrayLike | None = N
     found, ends = places(hand, joints, palm_pose), hand_arrays(hand).starts[1:] - 1
     each = [jacobian(hand, found, end, found.tips[:, f]) for f, end in enumerate(ends.tolist())]
     return np.stack(each, axis=1)
+
+
+def direction(down: ArrayLike, name: str) -> Array:
+    """Scale a direction to unit length, (3,)."""
+    way = np.array(value_of(Direction, down, name))
+    return way / float(np.linalg.norm(way))
 
 
 def rotation_about(axis: Array, angle: float) -> Array:

@@ -61,8 +61,8 @@ from grasp_core.execution.carried_mass import GAP, CarryingHand, HandPayload, ca
 from grasp_core.execution.grips import Grip
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.hands.hand import Hand
-from grasp_core.hands.hand_arrays import HandPlaces, jacobian, places
-from grasp_core.hands.reach import HandReach, Stance, direction, stance_of
+from grasp_core.hands.hand_arrays import HandPlaces, direction, jacobian, places
+from grasp_core.hands.reach import HandReach, Stance, stance_of
 from grasp_core.kinds import LARGEST, Quantity, value_of
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron

@@ -42,8 +42,10 @@ from grasp_core.hands.hand_arrays import (
     SurfaceTree,
     Targets,
     Wanted,
+    direction,
     hand_arrays,
 )
+from grasp_core.hands.settings import ReachSettings
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.ties import largest_first
 from grasp_core.values import FINGERS, Grasp
@@ -97,14 +99,24 @@ class Asked:
     body: Polyhedron
     grasp: Grasp
     friction: float
-    up: Array  # unit normal of the table, (3,)
-    height: float  # its height along it; minus infinity for none [m]
-    clearance: float
-    """Least distance of everything from what it must not touch [m], but for links whose tips touch
-    the object: they must only not overlap it."""
-    regions: bool  # whether contacts may be anywhere in their regions
-    seed: int
-    most_starts: int  # largest number of starts for each choice of contacts
+    settings: ReachSettings
+
+    @property
+    def clearance(self) -> float:
+        """Return the least distance of everything from what it must not touch [m].
+
+        Links whose tips touch the object must only not overlap it.
+        """
+        return self.settings.clearance_m
+
+    @cached_property
+    def table(self) -> tuple[Array, float]:
+        """Return the table's unit normal, (3,), and its height along it [m]: -inf for none."""
+        down = self.settings.table_down
+        if down is None:
+            return np.array([0.0, 0.0, 1.0]), -np.inf
+        up = -direction(down, "table_down")
+        return up, float((self.body.vertices @ up).min())
 
     @cached_property
     def arrays(self) -> HandArrays:
@@ -171,7 +183,7 @@ def targets(asked: Asked, used: Indices, *, regions: bool) -> Targets:
         np.array([plane_tangents(*normal) for normal in normals.tolist()]),
         np.where(aimed, 0.0, 1.0), np.full((len(used), 3), np.nan), SOFT,
         np.repeat(numbers, [each.shape[1] for each in edges]), points, inward,
-        np.array(asked.up), asked.height,
+        *asked.table,
     )  # fmt: skip
 
 
@@ -201,7 +213,7 @@ def postures(hand: Hand, seed: int) -> tuple[Array, Array]:
 
 def starts(asked: Asked, positions: Array, normals: Array) -> Iterator[tuple[Indices, Pose]]:
     """Choose where to start from, best first: the finger for each contact, (k,), and a pose."""
-    (joints, ends), arrays = postures(asked.hand, asked.seed), asked.arrays
+    (joints, ends), arrays = postures(asked.hand, asked.settings.seed), asked.arrays
     if not len(joints):
         return
     orders = np.array(list(permutations(range(len(arrays.tip_radii)), len(normals))))
@@ -228,7 +240,7 @@ def starts(asked: Asked, positions: Array, normals: Array) -> Iterator[tuple[Ind
     Vt[:, 2] *= np.sign(np.linalg.det(U) * np.linalg.det(Vt))[:, None]
     turns = np.einsum("nji,nkj->nik", Vt, U)  # lay ours best over theirs
     rests = ((np.einsum("nij,nkj->nki", turns, ours) - theirs) ** 2).sum(axis=(1, 2))
-    best = np.argsort((rests / ARM**2).round(ROUND), kind="stable")[: asked.most_starts]
+    best = np.argsort((rests / ARM**2).round(ROUND), kind="stable")[: asked.settings.starts]
     places = center - np.einsum("nij,nj->ni", turns, held)
     for n in best:
         turned, place = _steady(turns[n]), to_digits(places[n], LENGTH)
@@ -271,7 +283,7 @@ def find_pose(asked: Asked, choices: Sequence[tuple[int, ...]]) -> FoundPose | C
     tally: Counter[str] = Counter()
     for chosen in choices:
         used = np.array(chosen, np.int64)
-        aims = targets(asked, used, regions=asked.regions)
+        aims = targets(asked, used, regions=asked.settings.regions)
         for fingers, pose in starts(asked, aims.origins, aims.normals):
             ended = _tried(asked, used, aims._replace(fingers=fingers), pose)
             if not isinstance(ended, str):
@@ -343,10 +355,10 @@ def blocking(asked: Asked, pose: Pose, fingers: Indices | None = None) -> str:
     if fingers is not None:
         needs[np.isin(arrays.shape_links, arrays.starts[fingers + 1] - 1)] = 0.0
         needs[np.isin(arrays.shape_tips, fingers)] = -TOUCHING
-    shapes = arrays, pose.turned, pose.middles
+    shapes, (up, height) = (arrays, pose.turned, pose.middles), asked.table
     if kernel.of_itself(*shapes, clearance) < clearance:
         return "self"
-    if asked.height > -np.inf and kernel.of_table(*shapes, asked.up, asked.height) < clearance:
+    if height > -np.inf and kernel.of_table(*shapes, up, height) < clearance:
         return "table"
     return "object" if kernel.of_object(*shapes, asked.tree, needs) < 0.0 else ""
 

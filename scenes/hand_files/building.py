@@ -5,21 +5,37 @@ links, and the others get copies without shapes and masses, whose joints follow 
 finger, so that all move as one link.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import combinations
 from pathlib import Path
 
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.errors import InputError, about
 from grasp_core.hands.collisions import overlapping_pairs
-from grasp_core.hands.hand import PALM, Coupling, Hand, HandFinger, Joint, Link, LinkShape
+from grasp_core.hands.hand import (
+    FEWEST_FINGERS,
+    MOST_FINGERS,
+    PALM,
+    Coupling,
+    Hand,
+    HandFinger,
+    Joint,
+    Link,
+    LinkShape,
+)
 from grasp_core.hands.hand_arrays import rotation_about
+from grasp_core.kinds import path_of, several, value_of
+from grasp_core.messages import shown
+from grasp_core.names import HANDS
 from scenes.hand_files.fingers import Chains, chains, followers, joint_name, tip_of
 from scenes.hand_files.model import NO_MASS_KG, HandModel, compiled_hand
 from scenes.hand_files.model_text import model_text, note
 
+ENDINGS = (".xml", ".mjcf", ".urdf")
 AS_BOXES = "shapes other than boxes, capsules and spheres are taken as their boxes"
 CLOSE_BY = 2
 """Number of joints between links that may be built into each other, at most."""
@@ -27,8 +43,33 @@ FULL_TURN = np.pi
 """Largest angle of a joint for which the file states no range [rad]."""
 
 
-def hand_from_file(path: Path, fingertips: tuple[str, ...]) -> Hand:
-    """Make the hand that a file describes."""
+def hand_from_file(path: str | Path, fingertips: Iterable[str]) -> Hand:
+    """Make the hand that a file describes.
+
+    Args:
+        path: An MJCF file (.xml, .mjcf) or a URDF file (.urdf).
+        fingertips: Name of a site, geom or body for each of three to five fingertips.
+
+    Raises:
+        InputError: The file is refused; the message says what to do.
+    """
+    names = several(fingertips, partial(value_of, str, name="fingertips"), "fingertips", "names")
+    place = path_of(path, "path")
+    if place.suffix.lower() not in ENDINGS:
+        raise InputError(
+            f"path must be that of a file that ends with {', '.join(ENDINGS)}, got "
+            f"{shown(str(path))}; built-in hands are {', '.join(HANDS)}"
+        )
+    if not FEWEST_FINGERS <= len(names) <= MOST_FINGERS:
+        raise InputError(
+            f"{place}: name {FEWEST_FINGERS} to {MOST_FINGERS} fingertips (sites, geoms or bodies "
+            f"of the file), got {len(names)}"
+        )
+    with about(place):
+        return _read(place, tuple(names))
+
+
+def _read(path: Path, fingertips: tuple[str, ...]) -> Hand:
     read = model_text(path)
     model = compiled_hand(read)
     found = chains(model, fingertips)

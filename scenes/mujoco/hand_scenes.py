@@ -40,8 +40,9 @@ from grasp_core.errors import InputError
 from grasp_core.execution.grips import Grip
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.hands.hand import Hand
+from grasp_core.hands.hand_arrays import direction
 from grasp_core.hands.hand_motors import HandGrip, hand_motors
-from grasp_core.hands.reach import HandReach, direction, stance_of, uncoupled
+from grasp_core.hands.reach import HandReach, stance_of, uncoupled
 from grasp_core.kinds import instance
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron

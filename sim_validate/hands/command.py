@@ -8,7 +8,7 @@ import math
 import shlex
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TypeAlias
@@ -19,20 +19,21 @@ from grasp_core.errors import InputError, SolverError
 from grasp_core.figures import NONE, meanings, table
 from grasp_core.files.file_kinds import GRASPS, REACHES
 from grasp_core.files.records import RecordFile, record_of
-from grasp_core.hands.hand import Coupling, Hand
+from grasp_core.hands.hand import Coupling, Hand, load_hand
 from grasp_core.hands.hand_motors import hand_payload
 from grasp_core.hands.reach import HandReach, reach_with, uncoupled
+from grasp_core.hands.settings import ReachSettings
 from grasp_core.messages import MILLI
 from grasp_core.names import HANDS
 from grasp_core.objects.polyhedron import Polyhedron, is_convex
 from grasp_core.planning.result import Plan
 from grasp_core.values import Grasp
-from scenes.hand_files.loading import load_hand
+from scenes.hand_files.building import hand_from_file
 from sim_validate.engine.setup import Agenda
 from sim_validate.execution.verdict import ExecutedGrasp, held_controls_in_words, loss_in_words
 from sim_validate.hands import flags as hand_flags
 from sim_validate.hands.dexgraspbench import dex_record, write_dex_object, write_dex_record
-from sim_validate.hands.reaches import CarriedMass, ReachedGrasp, Reaches, ReachSettings
+from sim_validate.hands.reaches import CarriedMass, ReachedGrasp, Reaches
 from sim_validate.hands.trials import (
     MOST_PUSH_N,
     HandVerdict,
@@ -69,7 +70,7 @@ class ReachJob:
     def __call__(self, grasp: Grasp) -> ReachedGrasp:
         """Look for a pose in a grasp, and try it as asked."""
         hand, body, friction = self.hand, self.body, self.friction
-        reach = reach_with(hand, body, grasp, friction, **asdict(self.asked))
+        reach = reach_with(hand, body, grasp, friction, self.asked)
         found = partial(ReachedGrasp, reach, contacts_sha256(grasp.contacts))
         if not reach.reached:
             return found()
@@ -116,10 +117,7 @@ def _reach(command: hand_flags.Reach, hand: Hand, saved: Plan, reporter: Reporte
         remove_results(command.out, REACHES)
     job = ReachJob(
         hand, saved.body, saved.friction,
-        ReachSettings(
-            not command.contacts_only, command.table, command.clearance_m, command.starts,
-            command.seed,
-        ),
+        command.pose,
         simulated=command.simulate and not command.protocol,  # not those of other tools
         execution=None if command.mass_kg is None else hand_execution_settings(command.mass_kg),
     )  # fmt: skip
@@ -252,8 +250,12 @@ SHAPES_WEIGH = "MuJoCo gives links without inertia in the file that of their sha
 
 def asked_hand(command: hand_flags.Hand | hand_flags.Reach) -> Hand:
     """Load the hand that a command names."""
-    names = (name.strip() for name in command.fingertips.split(","))
-    return load_hand(command.hand, [name for name in names if name])
+    names = [name.strip() for name in command.fingertips.split(",") if name.strip()]
+    if command.hand not in HANDS:
+        return hand_from_file(command.hand, names)
+    if names:
+        raise FlagsError(f"the built-in hand {command.hand} has its own --fingertips")
+    return load_hand(command.hand)
 
 
 def show_hand(command: hand_flags.Hand, reporter: Reporter) -> int:

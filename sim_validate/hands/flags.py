@@ -10,9 +10,11 @@ from typing import Annotated
 from tyro.conf import Positional, UseAppendAction, arg
 
 from grasp_core.declared import declared
-from grasp_core.kinds import Direction, HandClearance, Quantity, Seed, Starts, TorqueLimit
+from grasp_core.hands.settings import ReachSettings
+from grasp_core.kinds import Quantity, TorqueLimit
 from grasp_core.names import HANDS
 from sim_validate.kit.command_flags import (
+    PLAIN,
     AtFriction,
     FirstOnly,
     GraspId,
@@ -46,15 +48,7 @@ class Reach(Spoken):
     hand: HandName = "allegro"
     fingertips: Fingertips = ""
     grasp: GraspId = None
-    table: Annotated[Direction | None, arg(metavar="X Y Z")] = None
-    """Downward direction in the object's frame: the object lies on a table across it, and the hand
-    stays above the table."""
-    contacts_only: bool = False
-    """Touch the planned contacts themselves, not anywhere in the grasps' regions."""
-    clearance_m: HandClearance = 5e-4
-    """Least distance between all that must not touch [m]."""
-    starts: Starts = 100
-    """Largest number of starts for each grasp."""
+    pose: Annotated[ReachSettings, PLAIN] = field(default_factory=ReachSettings)
     torque_limit_n_m: TorqueLimit | None = None
     """Torque limit of every joint [N m], instead of those of the hand."""
     simulate: bool = False
@@ -70,8 +64,6 @@ class Reach(Spoken):
     """Folder for records of DexGraspBench, one for each grasp that is reached, and for the object
     as it wants it, if that is convex."""
     friction: AtFriction = None
-    seed: Seed = 0
-    """Seed of the postures from which the search starts."""
     limit: FirstOnly = None
     jobs: Jobs = field(default_factory=available_cores)
     out: Path | None = None

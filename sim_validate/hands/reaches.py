@@ -20,8 +20,8 @@ from grasp_core.files.file_kinds import REACHES
 from grasp_core.hands.collisions import tip_distances
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach
-from grasp_core.kinds import FLAT, Direction, HandClearance, NotNegative, Seed, Starts
-from grasp_core.settings import Settings
+from grasp_core.hands.settings import ReachSettings
+from grasp_core.kinds import FLAT, NotNegative
 from sim_validate.execution.verdict import ExecutedGrasp
 from sim_validate.hands.trials import HandVerdict
 from sim_validate.kit.files import AboutGrasps
@@ -29,22 +29,6 @@ from sim_validate.settings import ExecutionSettings
 
 TOUCHING_M = 1e-4
 """How far a fingertip of a file may be from its contact [m]: ten times what reaching allows."""
-
-
-@declared
-class ReachSettings(Settings):
-    """What is asked of a pose, as `reach_with` takes it."""
-
-    regions: bool = True
-    """Whether contacts may be anywhere in the grasp's regions, or must be the planned ones."""
-    table_down: Direction | None = None
-    """Downward direction in the object's frame, if the object lies on a table."""
-    clearance_m: HandClearance = 5e-4
-    """Least distance between all that must not touch [m]."""
-    starts: Starts = 100
-    """Largest number of starts for each choice of contacts."""
-    seed: Seed = 0
-    """Seed of the postures from which the search starts."""
 
 
 @declared

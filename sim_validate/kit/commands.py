@@ -173,7 +173,7 @@ analyze plan/grasps.json --json
 transfer plan/grasps.json part-v2.stl --unit mm --out carried
 transfer plan/grasps.json part-v2.stl --unit mm --distance-m 0.005 --angle-deg 2
 reach plan/grasps.json --hand allegro --out reached
-reach plan/grasps.json --hand my_hand.xml --fingertips ff,mf,rf,th --table 0 0 -1
+reach plan/grasps.json --hand my_hand.xml --fingertips ff,mf,rf,th --table-down 0 0 -1
 reach plan/grasps.json --hand leap --simulate --protocol dexgraspbench --out reached
 hand allegro
 hand my_hand.xml --fingertips ff,mf,rf,th

@@ -6,13 +6,14 @@ A TOML file of settings becomes flags of an equivalent command line.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, cast, get_args, get_origin
 
 from tyro.conf import OmitArgPrefixes, UseAppendAction
 from tyro.constructors import ConstructorRegistry, PrimitiveConstructorSpec
 
+from grasp_core.declared import default_of
 from grasp_core.errors import InputError
 from grasp_core.kinds import Vector
 from grasp_core.messages import near
@@ -150,7 +151,9 @@ def _as_flags(flag: Flag, value: Any) -> list[str]:
     if any(isinstance(part, dict) for item in items for part in _items(item)):
         raise InputError(f"{flag.name}: expected a value or a list, got a table")
     if isinstance(value, bool):
-        return [word] if value else []
+        usual = next(default_of(each) for each in fields(flag.owner) if each.name == flag.field)
+        said = word if value else word.replace("--", "--no-", 1)
+        return [] if value is usual else [said]
     if listed(flag.kind) is not None:
         return [word, ",".join(map(str, items))]
     if UseAppendAction in get_args(flag.kind)[1:]:

@@ -183,14 +183,17 @@ CALLS = [
     }, succeeds_in="tests/sim_validate/hands/test_execute_hand.py"),
     Call("gc.load_hand", lambda: {"name": "leap"}, {"name": WORD}),
     Call("gc.reach_with", reaching, {
+        "settings": optional(VALUE),
+    }, slow=True),
+    Call("gc.ReachSettings", dict, {
         "regions": SWITCH,
         "table_down": optional(array([0.0, 0.0, -1.0])) | {"zero": [0.0, 0.0, 0.0]},
         "clearance_m": NOT_NEGATIVE | {"large": 0.5},
         "starts": AT_LEAST_ONE | {"many": 10**6},
-    }, slow=True),
-    Call("scenes.load_hand", lambda: {"hand": "allegro"}, {
-        "hand": WORD, "fingertips": unless(SEVERAL, "text") | {"for a built-in hand": ["tip"]},
     }),
+    Call("scenes.hand_from_file", lambda: {"path": "no/such.xml", "fingertips": ("a", "b", "c")}, {
+        "path": PATH, "fingertips": unless(SEVERAL, "text"),
+    }, succeeds_in="tests/scenes/hand_files/test_building.py"),
     Call("sv.protocol_names", dict),
     Call("sv.protocol", lambda: {"name": "dexonomy"}, {"name": NAME}),
     Call("sv.judge_by", lambda: {

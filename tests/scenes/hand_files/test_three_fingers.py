@@ -28,7 +28,7 @@ def file(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def hand(file):
-    return scenes.load_hand(file, THREE_TIPS)
+    return scenes.hand_from_file(file, THREE_TIPS)
 
 
 @pytest.fixture(scope="module")
@@ -97,7 +97,7 @@ def test_fingers_that_meet_in_the_middle_of_their_ranges_may_not_overlap(tmp_pat
     text = Path(three_fingers_file(tmp_path)).read_text()
     closed = tmp_path / "closed.xml"
     closed.write_text(text.replace('range="-70 70"', 'range="-140 0"'))
-    hand = scenes.load_hand(closed, THREE_TIPS)
+    hand = scenes.hand_from_file(closed, THREE_TIPS)
     owner = {link.name: finger.name for finger in hand.fingers for link in finger.links}
     middle = overlapping_pairs(hand, 0.5 * hand.ranges.sum(axis=1))
     across = [pair for pair in middle if len({owner.get(name, "palm") for name in pair}) == 2]
