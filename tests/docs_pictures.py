@@ -50,7 +50,8 @@ from scenes.settings import SAMPLE_S
 from sim_validate.closure.controls import negative_controls
 from sim_validate.closure.replaying import Recorded, replayed
 from sim_validate.engine.setup import Agenda, Setup
-from sim_validate.execution.execute import Fingertips, run_trials
+from sim_validate.execution.confirming import run_trials
+from sim_validate.execution.execute import Fingertips
 from sim_validate.execution.predictions import planned
 from sim_validate.execution.simulate import HeldBench
 from sim_validate.report.charts import (

@@ -57,8 +57,8 @@ def hand_from_file(path: str | Path, fingertips: Iterable[str]) -> Hand:
     place = path_of(path, "path")
     if place.suffix.lower() not in ENDINGS:
         raise InputError(
-            f"path must be that of a file that ends with {', '.join(ENDINGS)}, got "
-            f"{shown(str(path))}; built-in hands are {', '.join(HANDS)}"
+            f"path of a hand must end with {', '.join(ENDINGS)}, got {shown(str(path))}; built-in "
+            f"hands are {', '.join(HANDS)}"
         )
     if not FEWEST_FINGERS <= len(names) <= MOST_FINGERS:
         raise InputError(

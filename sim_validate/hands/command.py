@@ -8,7 +8,6 @@ import math
 import shlex
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TypeAlias
@@ -33,14 +32,10 @@ from sim_validate.engine.setup import Agenda
 from sim_validate.execution.verdict import ExecutedGrasp, held_controls_in_words, loss_in_words
 from sim_validate.hands import flags as hand_flags
 from sim_validate.hands.dexgraspbench import dex_record, write_dex_object, write_dex_record
+from sim_validate.hands.execute import executed_by_hand, hand_execution_settings
 from sim_validate.hands.reaches import CarriedMass, ReachedGrasp, Reaches
-from sim_validate.hands.trials import (
-    MOST_PUSH_N,
-    HandVerdict,
-    executed_by_hand,
-    hand_execution_settings,
-    validate_hand,
-)
+from sim_validate.hands.validate import MOST_PUSH_N, validate_hand
+from sim_validate.hands.verdict import HandVerdict
 from sim_validate.kit import workers
 from sim_validate.kit.compiling import REACHING, compile_loops, must_compile
 from sim_validate.kit.console import TABLE_ROWS, Reporter, say_cut
@@ -53,33 +48,6 @@ HELD = Agenda(critical_friction=False)
 """What hands hold: the usual wrenches, with controls."""
 Judge: TypeAlias = Callable[[Plan, Hand, Sequence[HandReach]], tuple[Exit, RecordFile]]
 """Judges a hand in its poses by another test; gives the exit code and its results."""
-
-
-@dataclass(frozen=True, slots=True)
-class ReachJob:
-    """What is asked of a hand in each grasp, as it is sent to a worker process."""
-
-    hand: Hand
-    body: Polyhedron
-    friction: float
-    asked: ReachSettings
-    simulated: bool = False  # whether the hand is also to hold test wrenches with its motors
-    execution: ExecutionSettings | None = None
-    """Settings with which it is also to execute the grasp."""
-
-    def __call__(self, grasp: Grasp) -> ReachedGrasp:
-        """Look for a pose in a grasp, and try it as asked."""
-        hand, body, friction = self.hand, self.body, self.friction
-        reach = reach_with(hand, body, grasp, friction, self.asked)
-        found = partial(ReachedGrasp, reach, contacts_sha256(grasp.contacts))
-        if not reach.reached:
-            return found()
-        held = executed = None
-        if self.simulated:
-            held = validate_hand(hand, body, reach, friction, agenda=HELD)
-        if self.execution is not None:
-            executed = executed_by_hand(hand, body, reach, friction, self.execution)
-        return found(carried(hand, body, reach, friction), held, executed)
 
 
 def reach_file(command: hand_flags.Reach, reporter: Reporter, judge: Judge | None = None) -> int:
@@ -115,22 +83,40 @@ def reach_file(command: hand_flags.Reach, reporter: Reporter, judge: Judge | Non
 def _reach(command: hand_flags.Reach, hand: Hand, saved: Plan, reporter: Reporter) -> Reaches:
     if command.out is not None:
         remove_results(command.out, REACHES)
-    job = ReachJob(
-        hand, saved.body, saved.friction,
-        command.pose,
-        simulated=command.simulate and not command.protocol,  # not those of other tools
-        execution=None if command.mass_kg is None else hand_execution_settings(command.mass_kg),
+    simulate = command.simulate and not command.protocol  # which simulate themselves
+    execution = None if command.mass_kg is None else hand_execution_settings(command.mass_kg)
+    work = partial(
+        reached_grasp, hand, saved.body, friction=saved.friction, asked=command.pose,
+        simulate=simulate, execution=execution,
     )  # fmt: skip
     if saved.grasps and must_compile(REACHING, command.jobs):
         reporter.say("compiling inner loops once, which takes a minute or two")
         compile_loops(REACHING)
-    settings = None if job.execution is None else job.execution.used
-    results, count = workers.each(job, saved.grasps, jobs=command.jobs), len(saved.grasps)
+    settings = None if execution is None else execution.used
+    results, count = workers.each(work, saved.grasps, jobs=command.jobs), len(saved.grasps)
     return reporter.collected(
         "reaching", results, count, ("reached", lambda each: each.reach.reached),
-        partial(Reaches, AboutObject.of(job.body), job.friction, hand, job.asked, settings),
-        command.out,
+        partial(
+            Reaches, AboutObject.of(saved.body), saved.friction, hand, command.pose, settings
+        ), command.out,
     )  # fmt: skip
+
+
+def reached_grasp(
+    hand: Hand, body: Polyhedron, grasp: Grasp, *, friction: float, asked: ReachSettings,
+    simulate: bool, execution: ExecutionSettings | None,
+) -> ReachedGrasp:  # fmt: skip
+    """Look for a pose in a grasp; there hold test wrenches and execute the grasp, if asked to."""
+    reach = reach_with(hand, body, grasp, friction, asked)
+    found = partial(ReachedGrasp, reach, contacts_sha256(grasp.contacts))
+    if not reach.reached:
+        return found()
+    held = executed = None
+    if simulate:
+        held = validate_hand(hand, body, reach, friction, agenda=HELD)
+    if execution is not None:
+        executed = executed_by_hand(hand, body, reach, friction, execution)
+    return found(carried(hand, body, reach, friction), held, executed)
 
 
 def _show(found: Reaches, reporter: Reporter) -> None:

@@ -7,7 +7,7 @@ import grasp_core as gc
 import scenes
 from grasp_core.errors import InputError
 from sim_validate.closure.validate import Agenda
-from sim_validate.hands.trials import validate_hand
+from sim_validate.hands.validate import validate_hand
 from tests.grasp_core.hands.gripping import FRICTION, grasps, scaled
 from tests.scenes.hand_files.grippers import CAPSULE, gripper, loaded, written
 from tests.scenes.hand_files.test_published_kinds import BALL_KG, TIPS, robot

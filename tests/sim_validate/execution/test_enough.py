@@ -9,7 +9,7 @@ import sim_validate as sv
 from sim_validate.execution.execute import Fingertips
 from sim_validate.execution.predictions import CLEAR, NoSqueezeError
 from sim_validate.execution.verdict import losses_in_words
-from sim_validate.hands.trials import hand_execution_settings
+from sim_validate.hands.execute import hand_execution_settings
 from tests.grasp_core.execution.held import box
 from tests.grasp_core.hands.gripping import FRICTION, scaled
 from tests.sim_validate.execution.held_rigs import G, opposed, planned
