@@ -27,7 +27,7 @@ from grasp_core.figures import Shown
 from grasp_core.frames import POSE
 from grasp_core.hands.hand import Fingertip, Hand
 from grasp_core.hands.hand_arrays import places
-from grasp_core.hands.pose_search import Asked, contact_choices, find_pose, opened
+from grasp_core.hands.pose_search import AskedPose, contact_choices, find_pose, opened
 from grasp_core.hands.settings import ReachSettings
 from grasp_core.kinds import Friction, HandClearance, Number, instance, value_of
 from grasp_core.messages import shown
@@ -178,7 +178,7 @@ def reach_with(
     instance(grasp, Grasp, "grasp", "plan finds some")
     value_of(Friction, friction, "friction")
     usual = ReachSettings() if settings is None else instance(settings, ReachSettings, "settings")
-    asked = Asked(hand, body, grasp, friction, replace(usual, **given))
+    asked = AskedPose(hand, body, grasp, friction, replace(usual, **given))
     clearance_m = asked.settings.clearance_m
     closed, refuted, undecided = contact_choices(grasp, friction, len(hand.fingers))
     if not closed:
@@ -196,7 +196,9 @@ def reach_with(
     )  # fmt: skip
 
 
-def _unclosed(asked: Asked, refuted: tuple[ClosureCertificate, ...], undecided: int) -> HandReach:
+def _unclosed(
+    asked: AskedPose, refuted: tuple[ClosureCertificate, ...], undecided: int
+) -> HandReach:
     count, name = len(asked.hand.fingers), asked.hand.name
     fewer = f"{name} has {count} fingers, and no {count} of the grasp's {FINGERS} contacts alone"
     at = f"at friction {asked.friction:g}"
@@ -301,10 +303,9 @@ def with_balls(
     if not touching:
         return hand
     found, made = places(hand, joints, palm_pose), list(hand.fingers)
-    ends = np.cumsum([len(finger.links) for finger in hand.fingers]) - 1
     for f, contact in touching.items():
-        radius, R = made[f].tip.radius, found.link_rotations[0, ends[f]]
+        radius, end = made[f].tip.radius, hand.chains[f][-1]
         middle = contact.position - radius * contact.normal
-        center = R.T @ (middle - found.link_positions[0, ends[f]])
+        center = found.link_rotations[0, end].T @ (middle - found.link_positions[0, end])
         made[f] = replace(made[f], tip=Fingertip(center, radius))
     return replace(hand, fingers=tuple(made))

@@ -1,12 +1,12 @@
 """Simulates and judges the trials of an execution, and confirms with short steps what was lost.
 
 A trial that is lost is run again with short steps: a loss counts only if it does not depend on the
-step. So is one whose object slips and is kept, but moves by more than `NEAR` of what is allowed:
-then the motion with short steps counts. Where contacts open and close between fingertips that push
-lightly, an object rattles. With steps of the usual length it bounces too much, and may fall where
-it would come to rest. Up to the first contact that opens or slips, steps of that length are exact
-enough, so a run with steps of `FINE_S` goes on from shortly before. It ends where the object is
-farther than it may be: a loss is confirmed then, whatever comes later.
+step. So is one whose object slips and is kept, but moves by more than `NEAR_LOSS` of what is
+allowed: then the motion with short steps counts. Where contacts open and close between fingertips
+that push lightly, an object rattles. With steps of the usual length it bounces too much, and may
+fall where it would come to rest. Up to the first contact that opens or slips, steps of that length
+are exact enough, so a run with steps of `FINE_S` goes on from shortly before. It ends where the
+object is farther than it may be: a loss is confirmed then, whatever comes later.
 """
 
 import math
@@ -17,13 +17,13 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from scenes.mujoco.held_scene import held_physics
-from sim_validate.execution.paths import Drive
+from sim_validate.execution.paths import TrialDrive
 from sim_validate.execution.simulate import (
-    FULL,
+    FULL_LOAD,
     IDLE,
     HeldBench,
     HeldMotion,
-    Outcome,
+    TrialFigures,
     cosines,
     first_trouble,
     outcome,
@@ -35,18 +35,18 @@ from sim_validate.settings import ExecutionSettings
 
 FINE_S = 1.25e-4
 """Length of steps that confirm a loss, at most [s]."""
-FINER = 4
+FINER_STEPS = 4
 """Number of such steps in a step of the usual length, at least."""
-NEAR = 0.5
+NEAR_LOSS = 0.5
 """Share of the motion allowed above which short steps find that of a kept object that slips."""
-BEFORE = 4
+SAMPLES_BEFORE = 4
 """Samples before the first trouble that is seen at which the second run begins: what happens within
 a sample is not seen."""
-SHORTEST_S = 1e-5
+LEAST_STEP_S = 1e-5
 """Shortest step that is taken [s]."""
 STICKING = 20.0
 """Friction of contacts that stick, relative to the true one."""
-DIVERGED = Outcome(math.inf, math.inf, math.inf, dropped=True, slipped=True, first_slip=0.0)
+DIVERGED = TrialFigures(math.inf, math.inf, math.inf, dropped=True, slipped=True, first_slip=0.0)
 """What is known of an object that the simulator cannot follow."""
 
 
@@ -73,9 +73,9 @@ def confirmed_trials(
 
 
 def _is_near(trial: ExecutionTrial, settings: ExecutionSettings) -> bool:
-    """Whether an object moved by more than `NEAR` of what is allowed."""
+    """Whether an object moved by more than `NEAR_LOSS` of what is allowed."""
     moved, turned = trial.displacement_m, trial.turn_rad
-    return moved > NEAR * settings.most_m or turned > NEAR * settings.most_rad
+    return moved > NEAR_LOSS * settings.most_m or turned > NEAR_LOSS * settings.most_rad
 
 
 def _judged(
@@ -138,8 +138,8 @@ def confirming_bench(bench: HeldBench) -> HeldBench | None:
 
 def _short_steps(bench: HeldBench) -> int:
     """Return how many short steps there are in a sample."""
-    step_s = min(FINE_S, held_physics(bench.scene.layout).timestep / FINER)
-    return round(bench.sample_s / max(step_s, SHORTEST_S))
+    step_s = min(FINE_S, held_physics(bench.scene.layout).timestep / FINER_STEPS)
+    return round(bench.sample_s / max(step_s, LEAST_STEP_S))
 
 
 def run_again(
@@ -147,7 +147,7 @@ def run_again(
 ) -> dict[Trial, HeldMotion]:
     """Simulate trials with short steps from before their trouble on."""
     begins = [_begin(trial, motion) for trial, motion in motions.items()]
-    drives, starts = list[Drive](), list[Array]()
+    drives, starts = list[TrialDrive](), list[Array]()
     for (trial, motion), begin in zip(motions.items(), begins, strict=True):
         rest = trial.drive.rows(slice(begin + 1, None))
         # later states have the speed of a trial that starts to move when its weight has come
@@ -169,7 +169,7 @@ def _begin(trial: Trial, motion: HeldMotion) -> int:
     if (motion.forces[trial.begun, pushing] == 0.0).all(axis=1).any():
         return 0
     trouble = first_trouble(motion, layout.friction, trial.begun)
-    return max(0, trouble - BEFORE) if trouble < len(motion.moved) else 0
+    return max(0, trouble - SAMPLES_BEFORE) if trouble < len(motion.moved) else 0
 
 
 def _lost(motion: HeldMotion, begun: int, settings: ExecutionSettings) -> tuple[float, float]:
@@ -189,7 +189,7 @@ def with_first_slips(
         replace(trial, drive=replace(trial.drive, friction=STICKING * friction)): trial
         for trial, each in judged.items()
         if each.fate in {"slipped", "dropped"}
-        and (trial.weighing or each.kind == "lift" or each.simulated_first_slip >= FULL)
+        and (trial.weighing or each.kind == "lift" or each.simulated_first_slip >= FULL_LOAD)
     }
     for trial, motion in (run_trials(bench, tuple(rough)) if rough else {}).items():
         multiple = sticking_multiple(motion, trial.drive, friction, trial.begun)

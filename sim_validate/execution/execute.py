@@ -76,7 +76,7 @@ def execute(
     instance(asked, ExecutionSettings, "settings")
     if physics is not None:
         instance(physics, PhysicsSettings, "physics")
-    fingers = Fingertips(body, contacts, friction, physics)
+    fingers = SpringFingers(body, contacts, friction, physics)
     return execution_of(fingers, asked.for_body(body), threads=threads, enough=enough)
 
 
@@ -121,7 +121,7 @@ def _chosen_squeeze(holder: Holder, settings: ExecutionSettings, *, enough: bool
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Fingertips(Holder):
+class SpringFingers(Holder):
     """Fingertips on springs, which hold an object by contacts."""
 
     contacts: Sequence[Contact]
@@ -199,9 +199,9 @@ class ExecutionJob:
     enough: bool = True
 
     @property
-    def holder(self) -> Fingertips:
+    def holder(self) -> SpringFingers:
         """The fingertips that execute it."""
-        return Fingertips(self.body, self.grasp.contacts, self.friction, self.physics)
+        return SpringFingers(self.body, self.grasp.contacts, self.friction, self.physics)
 
 
 def executed(jobs: Sequence[ExecutionJob], processors: int) -> Iterator[ExecutedGrasp]:

@@ -63,8 +63,8 @@ from sim_validate.engine.known_cases import (
     two_digits,
 )
 from sim_validate.execution import paths
-from sim_validate.execution.paths import Drive, Table, idle, samples, smoother
-from sim_validate.execution.simulate import SLID, HeldBench, HeldMotion, outcome
+from sim_validate.execution.paths import TablePlane, TrialDrive, idle, samples, smoother
+from sim_validate.execution.simulate import SLIPPED_BY, HeldBench, HeldMotion, outcome
 
 DOWN = np.array(UPRIGHT)
 WEIGHT = GRAVITY_M_PER_S2 * DOWN
@@ -282,7 +282,7 @@ def _oblique(case: HeldCase) -> Check:
     return met(name, motion, (1.0 + WINDOW) * found.first_slip)
 
 
-def _ramp(case: HeldCase, rising: float, way: Array = DOWN) -> Drive:
+def _ramp(case: HeldCase, rising: float, way: Array = DOWN) -> TrialDrive:
     """Return the drive in which a weight grows past slip, a part of it as the palm's rise."""
     low = (1.0 - WINDOW) / (1.0 + WINDOW)
     share = np.concatenate([low * case.rise(), low + (1.0 - low) * case.rise(0.5 * SLOW)])
@@ -297,7 +297,7 @@ def _creep(case: HeldCase, motion: HeldMotion) -> Check:
     last, slid = _period(case), motion.slides()
     speed = float(np.abs(slid[-1] - slid[-last]).max()) / ((last - 1) * SAMPLE_S)
     longest = len(paths.turned_weight(case.frequency)) * SAMPLE_S
-    far = speed * longest / (SLID * case.radius_m)
+    far = speed * longest / (SLIPPED_BY * case.radius_m)
     name = "creep of contacts that stick in a whole trial, over what counts as slipped"
     return little(name, motion, far, CREEP)
 
@@ -421,12 +421,12 @@ def free_box(case: HeldCase) -> tuple[Check, ...]:
     )
 
 
-def _apart(case: HeldCase, bench: HeldBench, drive: Drive) -> Drive:
+def _apart(case: HeldCase, bench: HeldBench, drive: TrialDrive) -> TrialDrive:
     """Take the fingers and the table away from the box; the table faces it from above."""
     layout = bench.scene.layout
     back = -APART * case.radius_m * layout.frames[:, :, 0]
     reached = np.einsum("kij,ki->kj", layout.axes, back)
-    above = Table(-AWAY * case.radius_m * DOWN, DOWN)
+    above = TablePlane(-AWAY * case.radius_m * DOWN, DOWN)
     return replace(drive, grasping=np.zeros(len(drive)), reached=reached, table=above)
 
 
@@ -436,9 +436,9 @@ def _lifted(case: HeldCase, bench: HeldBench) -> tuple[Check, Check]:
     height = RAISED * weight / (FINGERS * case.stiffness_n_per_m)
     drive, begun = paths.lift(-DOWN, height, SAMPLE_S * len(case.rise()))
     share = weight / (case.object_kg * GRAVITY_M_PER_S2)
-    table = Table(case.halves[2] * DOWN, -DOWN)
+    table = TablePlane(case.halves[2] * DOWN, -DOWN)
     (motion,) = bench.run([replace(drive, gravity=share * drive.gravity, table=table)])
-    still = paths.samples(0.5 * paths.REST_S)
+    still = paths.samples(0.5 * paths.STILL_S)
     carried = -(motion.table @ DOWN) / weight
     before = float(carried[begun - still : begun].mean())
     after = float(np.abs(carried[-still:]).max())
@@ -477,7 +477,7 @@ def struck_box(case: HeldCase) -> Check:
     return Check(name, math.nan if faulty else changed, 0.0, CHANGED)
 
 
-def _blow(case: HeldCase) -> Drive:
+def _blow(case: HeldCase) -> TrialDrive:
     """Return the drive of half a sine of force along x, as long as a knock, and what follows."""
     strike = paths.samples(paths.STRIKE_S)
     after = max(LEAST_WATCHED, paths.samples(WATCHED * 2.0 * np.pi / case.frequency))

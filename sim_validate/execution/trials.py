@@ -51,12 +51,12 @@ from scenes.mujoco.mjcf_text import quaternion, rotations
 from scenes.mujoco.scene_text import TOUCH
 from sim_validate.engine.misplacement import MEETS, Balls, Pose, drawn_errors, turned_by
 from sim_validate.execution import paths
-from sim_validate.execution.paths import Drive, Table
-from sim_validate.execution.simulate import SLID, HeldBench, HeldMotion, outcome
+from sim_validate.execution.paths import TablePlane, TrialDrive
+from sim_validate.execution.simulate import SLIPPED_BY, HeldBench, HeldMotion, outcome
 from sim_validate.execution.verdict import ExecutionControl, Skipped
 from sim_validate.settings import ExecutionSettings, TrialKind
 
-ROOM = 1.5
+MEETING_ROOM = 1.5
 """Distance from which fingertips come, relative to how far points of the object can have moved."""
 
 
@@ -71,7 +71,7 @@ def misplaced_poses(layout: HeldLayout, off_m: Array, off_rad: Array) -> tuple[P
 
 def tips_met(layout: HeldLayout, poses: tuple[Pose, ...], off_m: float, off_rad: float) -> Array:
     """Return where fingertips stop, from their planned places along springs, (poses, k, 3) [m]."""
-    ways, room = layout.frames[:, :, 0], ROOM * (off_m + off_rad * layout.radius_m)
+    ways, room = layout.frames[:, :, 0], MEETING_ROOM * (off_m + off_rad * layout.radius_m)
     balls = Balls(
         layout.vertices, layout.triangles, layout.radius_m,
         layout.tip_radius_m - TOUCH * layout.radius_m, layout.tip_centers - room * ways, ways, room,
@@ -95,9 +95,9 @@ def closed_there(layout: HeldLayout, pose: Pose, tips: Array) -> bool | None:
     return decide(ContactCones.at(arms[0], normals / gaps[:, None], layout.friction)).closed
 
 
-FLAT = 1e-6
+SAME_FACE = 1e-6
 """Difference of normals, and of offsets in object radii, up to which facets are one face."""
-CLEAR = 0.01
+TABLE_GAP = 0.01
 """Least gap between fingertips and the table, in object radii."""
 
 
@@ -123,8 +123,8 @@ def rests(body: Polyhedron) -> tuple[Rest, ...]:
     for first in range(len(normals)):
         if first not in left:
             continue
-        alike = (np.abs(normals - normals[first]).max(axis=1) <= FLAT) & (
-            np.abs(offsets - offsets[first]) <= FLAT
+        alike = (np.abs(normals - normals[first]).max(axis=1) <= SAME_FACE) & (
+            np.abs(offsets - offsets[first]) <= SAME_FACE
         )
         own = [facet for facet in np.flatnonzero(alike) if facet in left]
         left -= set(own)
@@ -142,13 +142,13 @@ def rests(body: Polyhedron) -> tuple[Rest, ...]:
 def resting(body: Polyhedron, tips: Array, radii: Array) -> Rest | None:
     """Return the likeliest rest in which no fingertip meets the table; None if there is none."""
     for rest in rests(body):
-        if (tips @ rest.down + radii).max() <= rest.height - CLEAR * body.radius:
+        if (tips @ rest.down + radii).max() <= rest.height - TABLE_GAP * body.radius:
             return rest
     return None
 
 
-AXES = ("x", "y", "z")
-SIDES = tuple((sign, axis) for axis in range(3) for sign in (1.0, -1.0))
+AXIS_LETTERS = ("x", "y", "z")
+AXIS_SIDES = tuple((sign, axis) for axis in range(3) for sign in (1.0, -1.0))
 """Sign and axis of the six directions of stops and knocks."""
 OF_NO_SIZE: dict[TrialKind, str] = {"shake": "shake_g", "knock": "knock_n_s"}
 """Setting whose zero leaves no trial of a kind."""
@@ -160,7 +160,7 @@ class Trial:
 
     kind: TrialKind
     name: str
-    drive: Drive
+    drive: TrialDrive
     begun: int
     apart: bool = False
     """Whether the trial starts with open fingers, not from the squeezed object."""
@@ -168,7 +168,7 @@ class Trial:
     """Number of samples at the start in which the weight comes, as in other trials of the grasp."""
     turning: bool = False
     """Whether the load keeps turning, so that small slips add up."""
-    expected: Drive | None = None
+    expected: TrialDrive | None = None
     """What the prediction is for, if not for the drive itself."""
     starts_closed: bool | None = None
     """Whether fingertips first meet a misplaced object in force closure."""
@@ -204,21 +204,21 @@ def _lift(body: Polyhedron, layout: HeldLayout, settings: ExecutionSettings) -> 
         )
     give_m = layout.object_kg * GRAVITY_M_PER_S2 / layout.stiffness_along(rest.down)
     drive, begun = paths.lift(-rest.down, settings.lift_m, settings.lift_s, give_m)
-    table = Table(rest.height * rest.down, -rest.down)
+    table = TablePlane(rest.height * rest.down, -rest.down)
     return Trial("lift", "lift", replace(drive, table=table), begun - 1, apart=True)
 
 
 def _shakes(layout: HeldLayout, settings: ExecutionSettings) -> Iterator[Trial]:
     size = GRAVITY_M_PER_S2 * settings.shake_g
-    sizes = np.repeat([size, size / layout.radius_m], len(AXES))
-    names = [f"shake {how} {axis}" for how in ("along", "about") for axis in AXES]
+    sizes = np.repeat([size, size / layout.radius_m], len(AXIS_LETTERS))
+    names = [f"shake {how} {axis}" for how in ("along", "about") for axis in AXIS_LETTERS]
     for name, axis in zip(names, np.diag(sizes), strict=True):
         drive = paths.shake(layout.gravity, axis, settings.shake_hz)
         yield Trial("shake", name, drive, 0, weighing=paths.WEIGHING)
 
 
 def _stops(layout: HeldLayout, settings: ExecutionSettings) -> Iterator[Trial]:
-    for sign, axis in SIDES:
+    for sign, axis in AXIS_SIDES:
         way = sign * np.eye(3)[axis]
         drive = paths.stop(layout.gravity, way, settings.stop_m_per_s2, settings.stop_from_m_per_s)
         yield Trial("stop", f"stop {_side(sign, axis)}", drive, 0, weighing=paths.WEIGHING)
@@ -226,7 +226,7 @@ def _stops(layout: HeldLayout, settings: ExecutionSettings) -> Iterator[Trial]:
 
 def _knocks(layout: HeldLayout, settings: ExecutionSettings) -> Iterator[Trial]:
     """Yield knocks along both sides of each axis, half the object's radius beside its middle."""
-    for sign, axis in SIDES:
+    for sign, axis in AXIS_SIDES:
         point = 0.5 * layout.radius_m * np.eye(3)[(axis + 1) % 3]
         drive = paths.knock(layout.gravity, sign * settings.impulse_n_s * np.eye(3)[axis], point)
         yield Trial("knock", f"knock {_side(sign, axis)}", drive, 0, weighing=paths.WEIGHING)
@@ -249,12 +249,11 @@ def _misplaced(layout: HeldLayout, settings: ExecutionSettings) -> Iterator[Tria
 
 
 def _side(sign: float, axis: int) -> str:
-    return f"{'+' if sign > 0.0 else '-'}{AXES[axis]}"
+    return f"{'+' if sign > 0.0 else '-'}{AXIS_LETTERS[axis]}"
 
 
-FRICTION = 0.9
-SQUEEZE = 0.9
-"""Friction and squeeze of the controls, relative to the trials'."""
+GRIP_SHARE = 0.9
+"""Friction, or squeeze, of a control, relative to the trials'."""
 SURE = 1.25
 """Load of a control, relative to that at which the analysis says that it slips: fingertips that
 roll to an edge of their face hold up to a tenth more."""
@@ -284,7 +283,7 @@ def run_controls(
     rise_s = min(max(2.0 * paths.RISE_S, FOLLOWED / lowest_frequency), LONGEST_RISE_S)
     share = paths.smooth(paths.samples(rise_s))
     closing, loading = paths.closing(), paths.loaded(share, np.zeros(3))
-    weaker, drives = tuple(weaker_grips(best, bench.scene.layout)), list[Drive]()
+    weaker, drives = tuple(weaker_grips(best, bench.scene.layout)), list[TrialDrive]()
     for each in weaker:
         drive = closing.then(replace(loading, wrenches=share[:, None] * each.load))
         grasping = np.outer(drive.grasping, each.pushing)
@@ -296,12 +295,12 @@ def run_controls(
     )
 
 
-def _judged(weaker: Weaker, motion: HeldMotion, drive: Drive, begun: int) -> ExecutionControl:
+def _judged(weaker: Weaker, motion: HeldMotion, drive: TrialDrive, begun: int) -> ExecutionControl:
     """Say whether a contact slipped under the load, or while fingers closed and one was idle."""
     found = outcome(motion, drive, weaker.friction, begun)
     if weaker.idle:
         closing = motion.slides()[: begun + 1]
-        if float(closing.max()) > SLID * motion.layout.radius_m:
+        if float(closing.max()) > SLIPPED_BY * motion.layout.radius_m:
             return ExecutionControl(weaker.name, let_go=True, first_slip=0.0)
     return ExecutionControl(weaker.name, found.slipped, found.first_slip)
 
@@ -310,14 +309,14 @@ def weaker_grips(best: BestSqueeze, layout: HeldLayout) -> Iterator[Weaker]:
     """Yield the weaker grips of a chosen squeeze, with their loads."""
     grip, load = best.grip, slipping_load(best)
     all_push = np.ones(len(grip.friction))
-    little = replace(grip, friction=FRICTION * grip.friction)
-    yield Weaker(f"friction {FRICTION:g}", little.friction, all_push, _sure(little, load) * load)
-    loose, pushing = grip.squeezed(SQUEEZE * grip.squeeze), SQUEEZE * all_push
-    yield Weaker(f"squeeze {SQUEEZE:g}", grip.friction, pushing, _sure(loose, load) * load)
+    little = replace(grip, friction=GRIP_SHARE * grip.friction)
+    yield Weaker(f"friction {GRIP_SHARE:g}", little.friction, all_push, _sure(little, load) * load)
+    loose, pushing = grip.squeezed(GRIP_SHARE * grip.squeeze), GRIP_SHARE * all_push
+    yield Weaker(f"squeeze {GRIP_SHARE:g}", grip.friction, pushing, _sure(loose, load) * load)
     strongest = first_best(layout.pushes.max(axis=1))
     others_push = all_push.copy()
     others_push[strongest] = 0.0
-    left = idle(grip, strongest, layout.axes[strongest] @ layout.pushes[strongest])
+    left = without_push(grip, strongest, layout.axes[strongest] @ layout.pushes[strongest])
     name = "a finger that does not push"
     yield Weaker(name, grip.friction, others_push, _sure(left, load) * load, True)
 
@@ -331,7 +330,7 @@ def _sure(weaker: Grip, load: Array) -> float:
     return max(1.0, SURE * found.multiple) if np.isfinite(found.multiple) else 1.0
 
 
-def idle(grip: Grip, finger: int, push: Array) -> Grip:
+def without_push(grip: Grip, finger: int, push: Array) -> Grip:
     """Return the squeeze that is left by (1) where a finger does not push."""
     maps = grasp_map(grip.arms).reshape(len(grip.elastic_stiffness), -1, 3).transpose(1, 0, 2)
     motion = np.asarray(np.linalg.solve(grip.elastic_stiffness, -maps[finger] @ push), dtype=float)

@@ -44,7 +44,7 @@ from sim_validate.kit.files import AboutObject, alone_in, remove_results
 from sim_validate.planning.asked_objects import asked_grasps
 from sim_validate.settings import ExecutionSettings
 
-HELD = Agenda(critical_friction=False)
+HAND_AGENDA = Agenda(critical_friction=False)
 """What hands hold: the usual wrenches, with controls."""
 Judge: TypeAlias = Callable[[Plan, Hand, Sequence[HandReach]], tuple[Exit, RecordFile]]
 """Judges a hand in its poses by another test; gives the exit code and its results."""
@@ -113,7 +113,7 @@ def reached_grasp(
         return found()
     held = executed = None
     if simulate:
-        held = validate_hand(hand, body, reach, friction, agenda=HELD)
+        held = validate_hand(hand, body, reach, friction, agenda=HAND_AGENDA)
     if execution is not None:
         executed = executed_by_hand(hand, body, reach, friction, execution)
     return found(carried(hand, body, reach, friction), held, executed)
@@ -234,7 +234,7 @@ SMALL_RANGE = math.radians(10.0)
 SHAPES_WEIGH = "MuJoCo gives links without inertia in the file that of their shapes at 1,000 kg/m^3"
 
 
-def asked_hand(command: hand_flags.Hand | hand_flags.Reach) -> Hand:
+def asked_hand(command: hand_flags.ShownHand | hand_flags.Reach) -> Hand:
     """Load the hand that a command names."""
     names = [name.strip() for name in command.fingertips.split(",") if name.strip()]
     if command.hand not in HANDS:
@@ -244,7 +244,7 @@ def asked_hand(command: hand_flags.Hand | hand_flags.Reach) -> Hand:
     return load_hand(command.hand)
 
 
-def show_hand(command: hand_flags.Hand, reporter: Reporter) -> int:
+def show_hand(command: hand_flags.ShownHand, reporter: Reporter) -> int:
     """Show fingers, joints and fingertips of a hand."""
     hand = asked_hand(command)
     reporter.document(record_of(hand))

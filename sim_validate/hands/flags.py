@@ -25,19 +25,19 @@ from sim_validate.kit.command_flags import (
 )
 from sim_validate.kit.workers import available_cores
 
-HandName = Annotated[str, arg(help=f"The hand: {', '.join(HANDS)}, or an MJCF or URDF file.")]
-Fingertips = Annotated[str, arg(metavar="NAME,NAME,...", help=(
+HandOrFile = Annotated[str, arg(help=f"The hand: {', '.join(HANDS)}, or an MJCF or URDF file.")]
+FingertipNames = Annotated[str, arg(metavar="NAME,NAME,...", help=(
     "For a hand from a file: names of sites, geoms or bodies that are fingertips, separated by "
     "commas."
 ))]  # fmt: skip
 
 
 @declared
-class Hand(Spoken):
+class ShownHand(Spoken):
     """Flags of the command `hand`."""
 
-    hand: Positional[HandName]
-    fingertips: Fingertips = ""
+    hand: Positional[HandOrFile]
+    fingertips: FingertipNames = ""
 
 
 @declared
@@ -45,8 +45,8 @@ class Reach(Spoken):
     """Flags of the command `reach`."""
 
     grasps: Positional[GraspsFile]
-    hand: HandName = "allegro"
-    fingertips: Fingertips = ""
+    hand: HandOrFile = "allegro"
+    fingertips: FingertipNames = ""
     grasp: GraspId = None
     pose: Annotated[ReachSettings, PLAIN] = field(default_factory=ReachSettings)
     torque_limit_n_m: TorqueLimit | None = None

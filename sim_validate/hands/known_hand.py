@@ -36,20 +36,20 @@ from sim_validate.engine.setup import Setup
 from sim_validate.engine.simulated_limits import ramped_limits
 from sim_validate.engine.stepping import Bench
 
-HALF, HEIGHT, TIP, TORQUE = 0.03, 0.08, 0.01, 0.35
+CUBE_HALF, HINGE_HEIGHT, KNOWN_TIP, KNOWN_TORQUE = 0.03, 0.08, 0.01, 0.35
 """Half-width of the cube, height of the hinges over the contacts, radius of the fingertips [m], and
 torque limit [N m]: those of a hand that people use."""
-LIMIT = (0.996, 1.006)
+KNOWN_LIMIT = (0.996, 1.006)
 """Interval of simulated over exact limits."""
-SOFTER = (0.99, 1.01)
+KNOWN_GIVE = (0.99, 1.01)
 """Interval of simulated over exact displacements."""
 SLIPPERY = 1e-4
 """Friction of the contacts that slide."""
-SETTLE_S = 0.5
+SLIPPERY_SETTLE_S = 0.5
 """Time in which the slippery cube comes to rest: five times what others are given [s]."""
 GENTLE = 0.1
 """Load of the slippery cube, over what one finger presses with."""
-OUTWARD = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, -0.0, -0.0], [-0.0, -1.0, -0.0]])
+CONTACT_WAYS = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, -0.0, -0.0], [-0.0, -1.0, -0.0]])
 """Outward normals at the contacts, (4, 3)."""
 
 
@@ -77,17 +77,17 @@ def cube() -> Polyhedron:
     box = example_object("box")
     vertices = box.vertices - box.center_of_mass
     return Polyhedron.from_mesh(
-        HALF * vertices / np.abs(vertices).max(axis=0), box.triangles, name="cube"
+        CUBE_HALF * vertices / np.abs(vertices).max(axis=0), box.triangles, name="cube"
     )
 
 
 def hinged_hand() -> Hand:
     """Return the hand with one hinge a finger."""
     fingers = list[HandFinger]()
-    for number, out in enumerate(OUTWARD):
-        axis, place = np.cross(np.eye(3)[2], out), HALF * out + np.array([0.0, 0.0, HEIGHT])
-        hinge = Joint(f"hinge{number}", place, np.eye(3), axis, -1.0, 1.0, TORQUE)
-        tip = Fingertip(TIP * out + np.array([0.0, 0.0, -HEIGHT]), TIP)
+    for number, out in enumerate(CONTACT_WAYS):
+        axis, place = np.cross(np.eye(3)[2], out), CUBE_HALF * out + HINGE_HEIGHT * np.eye(3)[2]
+        hinge = Joint(f"hinge{number}", place, np.eye(3), axis, -1.0, 1.0, KNOWN_TORQUE)
+        tip = Fingertip(KNOWN_TIP * out + np.array([0.0, 0.0, -HINGE_HEIGHT]), KNOWN_TIP)
         link = Link(f"link{number}", hinge, (), None, None)
         fingers.append(HandFinger(f"finger{number}", (link,), tip))
     return Hand("known hand", (), tuple(fingers))
@@ -95,7 +95,7 @@ def hinged_hand() -> Hand:
 
 def stance(friction: float) -> HandReach:
     """Return the pose in which it holds the cube, with its proof at a friction."""
-    proof = force_closure(HALF * OUTWARD, -OUTWARD, friction)
+    proof = force_closure(CUBE_HALF * CONTACT_WAYS, -CONTACT_WAYS, friction)
     return HandReach(
         "known hand", "cube", "", "", 1, 0.0, np.arange(4), np.zeros(4), np.eye(4), proof
     )
@@ -104,10 +104,10 @@ def stance(friction: float) -> HandReach:
 def _limits(
     scene: HandScene, body: Polyhedron, reach: HandReach, setup: Setup
 ) -> tuple[Check, ...]:
-    friction, press = scene.layout.friction, TORQUE / HEIGHT
+    friction, press = scene.layout.friction, KNOWN_TORQUE / HINGE_HEIGHT
     exact = {
         "across the contacts": (np.eye(6)[2], 4.0 * friction * press),
-        "about the axis across them": (np.eye(6)[5], 4.0 * friction * HALF * press),
+        "about the axis across them": (np.eye(6)[5], 4.0 * friction * CUBE_HALF * press),
         "against one finger": (np.eye(6)[0], (1.0 + 2.0 * friction) * press),
     }
     rig = closed_on(scene, setup, friction)
@@ -118,7 +118,7 @@ def _limits(
     found = ramped_limits(rig, loads)
     return tuple(
         Check(f"limit of motors {name}, over the exact one", math.nan if at is None else at.share,
-              *LIMIT)
+              *KNOWN_LIMIT)
         for name, at in zip(exact, found, strict=True)
     )  # fmt: skip
 
@@ -128,11 +128,11 @@ def _displaced(scene: HandScene, setup: Setup) -> Check:
     layout = smooth.layout
     # without the grasp's own friction forces, which slippery contacts do not carry
     forces = np.einsum("kij,kj->ki", layout.frames * np.array([1.0, 0.0, 0.0]), layout.squeeze)
-    patient = replace(setup, hold=replace(setup.hold, settle_s=SETTLE_S))
+    patient = replace(setup, hold=replace(setup.hold, settle_s=SLIPPERY_SETTLE_S))
     rig = squeezed(Bench(smooth), patient, forces, SLIPPERY)
-    size = GENTLE * TORQUE / HEIGHT
+    size = GENTLE * KNOWN_TORQUE / HINGE_HEIGHT
     (poses,) = rig.joints(rig.holds([Load(size * np.eye(6)[0], forces)]))
-    exact = size * HEIGHT**2 / (2.0 * smooth.hand.servo)
+    exact = size * HINGE_HEIGHT**2 / (2.0 * smooth.hand.servo)
     return Check(
-        "displacement by the servos, over the exact one", float(poses[-1, 0]) / exact, *SOFTER
+        "displacement by the servos, over the exact one", float(poses[-1, 0]) / exact, *KNOWN_GIVE
     )

@@ -78,7 +78,7 @@ COMMANDS: Mapping[str, Command] = {
         "Look for poses in which a hand stands in grasps: palm pose and joints, checked exactly.",
     ),
     "hand": Command(
-        "hands.flags:Hand", "hands.command:show_hand",
+        "hands.flags:ShownHand", "hands.command:show_hand",
         "Show what a hand was read as: fingers, joints with ranges and torque limits, fingertips.",
     ),
     "dataset build": Command(

@@ -9,7 +9,7 @@ import pytest
 import grasp_core as gc
 import scenes
 from grasp_core.hands.collisions import overlapping_pairs
-from grasp_core.hands.pose_search import TOUCHING
+from grasp_core.hands.pose_search import TIP_TOUCHING
 from tests.grasp_core.hands.gripping import FRICTION, grasps, scaled
 from tests.scenes.hand_files.grippers import Beside
 from tests.three_fingers import THREE_TIPS, three_fingers_file
@@ -68,7 +68,7 @@ def test_mujoco_has_fingertips_on_the_object_and_all_else_apart(file, hand, reac
         tips = {model.geom(name).id for name in THREE_TIPS}
         for geom in set(range(model.ngeom)) - {solid}:
             if geom in tips:
-                assert simulated.apart(geom) == pytest.approx(0.0, abs=TOUCHING + MUJOCO_SLACK)
+                assert simulated.apart(geom) == pytest.approx(0.0, abs=TIP_TOUCHING + MUJOCO_SLACK)
             else:
                 assert simulated.apart(geom) >= CLEARANCE - MUJOCO_SLACK
         for i, j in combinations(sorted(set(range(model.ngeom)) - {solid}), 2):

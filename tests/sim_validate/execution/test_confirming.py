@@ -11,7 +11,7 @@ import sim_validate as sv
 from sim_validate.engine.stepping import Health
 from sim_validate.execution import confirming
 from sim_validate.execution.confirming import FINE_S, confirming_bench, run_again, run_trials
-from sim_validate.execution.execute import Fingertips
+from sim_validate.execution.execute import SpringFingers
 from sim_validate.execution.predictions import HeldDynamics
 from sim_validate.execution.simulate import HeldBench, outcome
 from sim_validate.execution.trials import trials_of
@@ -73,7 +73,7 @@ def test_the_motion_of_a_kept_object_is_that_of_short_steps_where_it_nears_a_lim
 def trials_on_a_bench(settings):
     """The box on its bench, the trials of some settings, their motions, and the frictions."""
     body, grasp = planned("box")
-    fingers = Fingertips(body, grasp.contacts, 0.5)
+    fingers = SpringFingers(body, grasp.contacts, 0.5)
     best = fingers.squeeze(settings)
     scene = fingers.scene(settings, best)
     bench = HeldBench(scene)

@@ -12,7 +12,7 @@ from scenes.mujoco.held_scene import held_layout
 from scenes.mujoco.scene_text import TOUCH
 from scenes.settings import HeldSettings
 from sim_validate.engine.misplacement import drawn_errors
-from sim_validate.execution.trials import ROOM, closed_there, misplaced_poses, tips_met
+from sim_validate.execution.trials import MEETING_ROOM, closed_there, misplaced_poses, tips_met
 from tests.sim_validate.execution.held_rigs import planned
 
 OFF_M, OFF_RAD = 0.002, np.radians(3.0)
@@ -41,7 +41,7 @@ def distances(layout, points):
 
 def tip_paths(layout, pose, reached, count=200):
     """Centres of the fingertips on their ways to where they stop, in the object's frame."""
-    room = ROOM * (OFF_M + OFF_RAD * layout.radius_m)
+    room = MEETING_ROOM * (OFF_M + OFF_RAD * layout.radius_m)
     stop = layout.tip_centers + np.einsum("kij,kj->ki", layout.axes, reached)
     start = layout.tip_centers - room * layout.frames[:, :, 0]
     way = start + np.linspace(0.0, 1.0, count)[:, None, None] * (stop - start)
@@ -93,7 +93,7 @@ def test_a_finger_that_meets_nothing_stops_beyond_its_place():
     (pose,) = misplaced_poses(layout, off, np.zeros((1, 3)))
     reached = tips_met(layout, (pose,), OFF_M, 0.0)
     moved = np.einsum("kij,pkj->pki", layout.axes, reached)[0]
-    assert moved == pytest.approx(ROOM * OFF_M * layout.frames[:, :, 0], abs=1e-12)
+    assert moved == pytest.approx(MEETING_ROOM * OFF_M * layout.frames[:, :, 0], abs=1e-12)
     assert closed_there(layout, pose, reached[0]) is False
 
 

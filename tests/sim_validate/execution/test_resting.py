@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 import scenes
-from sim_validate.execution.trials import CLEAR, resting, rests
+from sim_validate.execution.trials import TABLE_GAP, resting, rests
 
 OBJECTS = ("tetrahedron", "wedge", "screwdriver", "l-bracket")
 
@@ -78,6 +78,6 @@ def test_fingertips_are_clear_of_the_table_on_the_likeliest_rest_that_lets_them(
         rest = resting(body, tips.reshape(-1, 3), np.full(len(tips), radius))
         assert rest is not None
         np.testing.assert_array_equal(rest.down, found[blocked].down)
-        assert (tips @ rest.down + radius).max() <= rest.height - CLEAR * body.radius
+        assert (tips @ rest.down + radius).max() <= rest.height - TABLE_GAP * body.radius
     everywhere = np.array([(rest.height + radius) * rest.down for rest in found])
     assert resting(body, everywhere, np.full(len(found), radius)) is None
