@@ -260,7 +260,6 @@ def _certified(found: _Round, loads: LoadSet, motors: Motors | None) -> BestSque
 
 
 def _first_reached(found: _Round) -> tuple[int, int, Array]:
-    """Find the contact or the joint that ends the scale, the other being -1, and the place z."""
     survival, numbers = found.survival, np.arange(len(found.scales))
     k, cases = survival.contacts, len(found.worst.cases)
     torques = survival.torques(numbers)[:, 0]

@@ -269,7 +269,6 @@ class CarryingHand(Declared):
         return WrenchBody(self.arms, self.normals, self.friction, self.push_n, self.motors)
 
     def _is_consistent(self) -> bool:
-        """Return whether the fields are those of contacts, and of motors that carry their links."""
         k = len(self.friction)
         return (
             k > 0

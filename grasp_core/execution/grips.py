@@ -128,7 +128,6 @@ class Grip(Declared):
         return replace(self, squeeze=squeeze)
 
     def _is_consistent(self) -> bool:
-        """Return whether the fields are those of contacts whose squeeze balances."""
         plain = replace(self)  # without what it has kept, which may be anything
         return len(self.friction) >= FEWEST and are_springs(self.stiffness) and plain.balanced
 

@@ -60,7 +60,6 @@ from grasp_core.kinds import LARGEST, SMALLEST, Quantity, number, value_of
 from grasp_core.solvers.ties import first_best
 
 GRAVITY_M_PER_S2 = 9.80665
-"""Standard gravity."""
 VANISHING = 1e-9
 """Size of the first coefficient of (6), relative to the largest, that takes the place of a smaller
 one: roots move by as much, and (4) by its square."""

@@ -190,7 +190,6 @@ class HandGrip(Grip):
     """Stiffness k_q of every servo."""
 
     def _is_consistent(self) -> bool:
-        """Return whether the fields are those of contacts and of fingers that can move them."""
         if not (super()._is_consistent() and self.joint_axes.shape[1]):
             return False
         lengths = np.linalg.norm(self.joint_axes, axis=2)

@@ -389,7 +389,6 @@ def opened(asked: AskedPose, found: FoundPose) -> tuple[Array | None, Array | No
 
 
 def _open_joints(asked: AskedPose, found: FoundPose, planned: Targets) -> Array | None:
-    """Return joint angles at which fingertips are off the surface and nothing overlaps."""
     arrays, kernel = asked.arrays, compiled(POSE_KERNEL)
     contacts, clear, held = found.certificate, asked.clearance, found.pose
     wanted = Gaps(clear, clear, clear, 0.0, 0.0, overlaps=True, palm_moves=False)
@@ -427,7 +426,6 @@ def _ways(asked: AskedPose, found: FoundPose) -> Array:
 
 
 def _is_free(asked: AskedPose, planned: Targets, held: HandPose, way: Array) -> bool:
-    """Return whether an open hand is free at all steps of a straight way in."""
     for back in np.arange(WAY_TICK, LINE + 0.5 * WAY_TICK, WAY_TICK):
         pose = asked.pose(len(planned.fingers), held.palm, held.origin - back * way, held.q)
         compiled(POSE_KERNEL).place(asked.arrays, planned, pose)

@@ -34,7 +34,6 @@ NAMED_BY_FILES = ("mesh", "texture", "hfield")
 PACKAGE = re.compile(r"(?:package|model)://([^/]*)/+")
 """What begins the names of files in URDF, with the name of a package."""
 MESHES = (".stl", ".obj", ".msh")
-"""Files that MuJoCo reads as meshes."""
 BESIDE_ENDINGS = (*MESHES, ".png", ".xml", ".mjcf")
 """Files that may lie in folders beside the model's."""
 PARENTS_TRIED = 4
@@ -47,7 +46,6 @@ MOBILE = {"revolute", "continuous", "prismatic"}
 """Kinds of URDF joints that move by one number."""
 PLAIN_NAME = re.compile(r"[\w.-]+", re.ASCII)
 MOST_LISTED = 8
-"""Number of links that a note names."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +93,6 @@ def model_text(path: Path) -> ModelText:
 
 
 def _parsed(raw: bytes, etree: Any) -> Any:
-    """Parse a text to its root element."""
     if b"<!DOCTYPE" in raw or b"<!ENTITY" in raw:
         raise InputError("a hand's file must not declare entities; remove <!DOCTYPE ...>")
     try:

@@ -47,7 +47,6 @@ TRUE_MASS = (
 SPRINGS = ("a", "b", "c")
 """Endings of the names of a fingertip's three slides."""
 FEWEST_SAMPLE_STEPS, MOST_SAMPLE_STEPS = 4, 128
-"""Least and largest number of steps in a sample."""
 STEP_RAD = 0.2
 """Largest angle by which the held object rings in a step: frequencies are then off by a fifth of a
 percent."""

@@ -43,11 +43,9 @@ SAMPLES_BEFORE = 4
 """Samples before the first trouble that is seen at which the second run begins: what happens within
 a sample is not seen."""
 LEAST_STEP_S = 1e-5
-"""Shortest step that is taken [s]."""
 STICKING = 20.0
 """Friction of contacts that stick, relative to the true one."""
 DIVERGED = TrialFigures(math.inf, math.inf, math.inf, dropped=True, slipped=True, first_slip=0.0)
-"""What is known of an object that the simulator cannot follow."""
 
 
 def confirmed_trials(
@@ -73,7 +71,6 @@ def confirmed_trials(
 
 
 def _is_near(trial: ExecutionTrial, settings: ExecutionSettings) -> bool:
-    """Whether an object moved by more than `NEAR_LOSS` of what is allowed."""
     moved, turned = trial.displacement_m, trial.turn_rad
     return moved > NEAR_LOSS * settings.most_m or turned > NEAR_LOSS * settings.most_rad
 
@@ -137,7 +134,6 @@ def confirming_bench(bench: HeldBench) -> HeldBench | None:
 
 
 def _short_steps(bench: HeldBench) -> int:
-    """Return how many short steps there are in a sample."""
     step_s = min(FINE_S, held_physics(bench.scene.layout).timestep / FINER_STEPS)
     return round(bench.sample_s / max(step_s, LEAST_STEP_S))
 

@@ -109,7 +109,6 @@ would sink and rise while they hold on to it [s]."""
 STILL_S = 0.1
 """Time before the load comes, and after it has gone [s]."""
 RISE_S = 0.15
-"""Time in which a load grows [s]."""
 TURN_GAP = 0.55
 """Angle between neighbouring turns of gravity's spiral [rad]."""
 SPIRAL_RATES = (1.0, 20.0)
@@ -120,7 +119,6 @@ by some degrees, and gains 2 % at most."""
 CYCLES = 2
 """Cycles of a shake at its full size, after one in which it grows."""
 STRIKE_S = 0.02
-"""Duration of a knock [s]."""
 WHOLE_SLACK = 1e-9
 """Difference from a whole number that is rounding."""
 TINY_M = 1e-12

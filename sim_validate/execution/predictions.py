@@ -362,7 +362,6 @@ def _stiff_enough(
 def _predicted(
     holder: Holder, settings: ExecutionSettings, best: BestSqueeze
 ) -> tuple[float, float]:
-    """Predict the multiples of first slip and of loss, of the trial that is lost first."""
     # all misplacements have the prediction of the weight
     _, dynamics, trials, _ = planned(holder, replace(settings, misplacements=1), best)
     found = dynamics.losses(trials, settings)

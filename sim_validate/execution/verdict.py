@@ -35,7 +35,6 @@ CLEAR_OF_SLIP = 1.05
 
 SQUEEZE_CONTACTS = 2
 MULTIPLE_FORM = ".2f"
-"""How multiples of loads are shown."""
 DEGREES = math.degrees(1.0)
 NO_MOTION = "-"
 """What stands for a motion that the simulator could not follow."""
@@ -44,7 +43,6 @@ MORE_HELD = Compared(more, "controls that did not slip")
 LESS_PREDICTED, LESS_SIMULATED = Compared(less, analysed=True), Compared(less, close="slips")
 FARTHER = Compared(more, close="slips")
 REASON_GIVEN = Compared(lambda _, after: after is not None)
-"""How figures are compared with those of an earlier execution."""
 
 
 @declared

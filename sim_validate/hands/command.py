@@ -45,7 +45,6 @@ from sim_validate.planning.asked_objects import asked_grasps
 from sim_validate.settings import ExecutionSettings
 
 HAND_AGENDA = Agenda(critical_friction=False)
-"""What hands hold: the usual wrenches, with controls."""
 Judge: TypeAlias = Callable[[Plan, Hand, Sequence[HandReach]], tuple[Exit, RecordFile]]
 """Judges a hand in its poses by another test; gives the exit code and its results."""
 
@@ -150,7 +149,8 @@ def _show(found: Reaches, reporter: Reporter) -> None:
 def carried(hand: Hand, body: Polyhedron, reach: HandReach, friction: float) -> CarriedMass | None:
     """Find the mass held in any orientation; None if the hand is not known well enough or weak."""
     with suppress(InputError, SolverError):  # a figure beside the pose, which is there without it
-        return CarriedMass.of(hand_payload(hand, body, reach, friction, max_push_n=MOST_PUSH_N))
+        found = hand_payload(hand, body, reach, friction, max_push_n=MOST_PUSH_N)
+        return CarriedMass(found.lower, found.upper, found.weakest)
     return None
 
 
@@ -299,7 +299,6 @@ def _weight(hand: Hand) -> str:
 
 
 def _follows(coupling: Coupling) -> str:
-    """Write a coupling as a formula, angles in degrees."""
     said = f"{coupling.joint} = {coupling.ratio:g} {coupling.driver}"
     offset = math.degrees(coupling.offset)
     return f"{said} {'-' if offset < 0.0 else '+'} {abs(offset):.4g} deg" if offset else said

@@ -110,7 +110,6 @@ class DexRecord(Declared):
 
 
 WANTED = keys(DexRecord)
-"""Fields that a record must have."""
 
 
 def load_dex_record(path: str | Path) -> DexRecord:
@@ -285,7 +284,6 @@ LEAP: tuple[InertialRow, ...] = (
 def _inertials(
     rows: tuple[InertialRow, ...], fingers: tuple[str, ...], thumb: tuple[str, ...]
 ) -> dict[str, dict[str, object]]:
-    """Return the inertials of a table by the names of links."""
     named = [f"{name}_{link}" for name in fingers for link in LINKS]
     names = [PALM_NAME, *named, *(f"thumb_{link}" for link in thumb)]
     every = [rows[0], *rows[1:5] * len(fingers), *rows[5:]]
@@ -308,7 +306,6 @@ HAND_FILES = {
         _inertials(LEAP, ("index", "middle", "ring"), LEAP_THUMB),
     ),
 }  # fmt: skip
-"""By the names of built-in hands."""
 HAND_FILES["allegro-urdf"] = HAND_FILES["allegro"]
 
 
@@ -473,7 +470,6 @@ def _palms(record: DexRecord, hand: Hand) -> Array:
 def _touched(
     hand: Hand, body: Polyhedron, joints: Array, palm: Array, touch_m: float
 ) -> tuple[list[int], tuple[Contact, ...]]:
-    """Find the fingers that touch, and where."""
     gaps, on_tips, on_object = tip_gaps(hand, body, joints, palm, np.arange(len(hand.fingers)))
     fingers, contacts = np.flatnonzero(np.abs(gaps) <= touch_m).tolist(), list[Contact]()
     for finger in fingers:

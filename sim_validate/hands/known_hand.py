@@ -44,7 +44,6 @@ KNOWN_LIMIT = (0.996, 1.006)
 KNOWN_GIVE = (0.99, 1.01)
 """Interval of simulated over exact displacements."""
 SLIPPERY = 1e-4
-"""Friction of the contacts that slide."""
 SLIPPERY_SETTLE_S = 0.5
 """Time in which the slippery cube comes to rest: five times what others are given [s]."""
 GENTLE = 0.1

@@ -14,7 +14,6 @@ from pydantic import computed_field
 from grasp_core.arrays import UnitVector
 from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError
-from grasp_core.execution.carried_mass import HandPayload
 from grasp_core.figures import Shown
 from grasp_core.files.file_kinds import REACHES
 from grasp_core.hands.collisions import tip_distances
@@ -33,7 +32,10 @@ TOUCHING_M = 1e-4
 
 @declared
 class CarriedMass(Declared):
-    """The largest mass that a hand holds in any orientation, its links included."""
+    """The largest mass that a hand holds in any orientation, its links included.
+
+    The proofs are left out: `hand_payload` finds them again.
+    """
 
     lower_kg: NotNegative
     """Mass that is held in every orientation, with forces chosen anew for each [kg]."""
@@ -41,11 +43,6 @@ class CarriedMass(Declared):
     """Mass above which some orientation is not held [kg]."""
     weakest_gravity: UnitVector
     """Direction of gravity in which the hand lets go first, in the object's frame."""
-
-    @classmethod
-    def of(cls, found: HandPayload) -> "CarriedMass":
-        """Leave out the proofs, which `hand_payload` finds again."""
-        return cls(found.lower, found.upper, found.weakest)
 
 
 @declared
