@@ -35,6 +35,7 @@ from grasp_core.hands.hand_motors import hand_motors as hand_motors
 from grasp_core.hands.hand_motors import hand_payload as hand_payload
 from grasp_core.hands.reach import HandReach as HandReach
 from grasp_core.hands.reach import reach_with as reach_with
+from grasp_core.hands.settings import ReachSettings as ReachSettings
 from grasp_core.mesh_files.limits import MeshLimits as MeshLimits
 from grasp_core.mesh_files.limits import PatchLimits as PatchLimits
 from grasp_core.objects.polyhedron import Polyhedron as Polyhedron

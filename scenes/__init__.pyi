@@ -6,7 +6,7 @@ from scenes.drawing.sheets import Sheet as Sheet
 from scenes.example_objects import example_names as example_names
 from scenes.example_objects import example_object as example_object
 from scenes.exports import export_grasps as export_grasps
-from scenes.hand_files.loading import load_hand as load_hand
+from scenes.hand_files.building import hand_from_file as hand_from_file
 from scenes.mujoco.closure_scene import Layout as Layout
 from scenes.mujoco.closure_scene import Scene as Scene
 from scenes.mujoco.closure_scene import build_scene as build_scene

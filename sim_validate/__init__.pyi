@@ -23,10 +23,11 @@ from sim_validate.hands.dexgraspbench import load_dex_record as load_dex_record
 from sim_validate.hands.dexgraspbench import reach_of_record as reach_of_record
 from sim_validate.hands.dexgraspbench import write_dex_object as write_dex_object
 from sim_validate.hands.dexgraspbench import write_dex_record as write_dex_record
-from sim_validate.hands.trials import HandVerdict as HandVerdict
-from sim_validate.hands.trials import execute_hand as execute_hand
-from sim_validate.hands.trials import hand_setup as hand_setup
-from sim_validate.hands.trials import validate_hand as validate_hand
+from sim_validate.hands.execute import execute_hand as execute_hand
+from sim_validate.hands.execute import hand_execution_settings as hand_execution_settings
+from sim_validate.hands.validate import hand_setup as hand_setup
+from sim_validate.hands.validate import validate_hand as validate_hand
+from sim_validate.hands.verdict import HandVerdict as HandVerdict
 from sim_validate.planning.regions import load_regions as load_regions
 from sim_validate.protocols.judging import Judgement as Judgement
 from sim_validate.protocols.judging import judge_by as judge_by

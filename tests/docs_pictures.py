@@ -50,7 +50,8 @@ from scenes.settings import SAMPLE_S
 from sim_validate.closure.controls import negative_controls
 from sim_validate.closure.replaying import Recorded, replayed
 from sim_validate.engine.setup import Agenda, Setup
-from sim_validate.execution.execute import Fingertips, run_trials
+from sim_validate.execution.confirming import run_trials
+from sim_validate.execution.execute import SpringFingers
 from sim_validate.execution.predictions import planned
 from sim_validate.execution.simulate import HeldBench
 from sim_validate.report.charts import (
@@ -257,7 +258,7 @@ def trials():
 def hardest(body, grasp, mass_kg):
     """Simulate an execution: times and displacements [s, mm] of the worst trial of each kind."""
     settings = ExecutionSettings(mass_kg=mass_kg).for_body(body)
-    holder = Fingertips(body, grasp.contacts, FRICTION)
+    holder = SpringFingers(body, grasp.contacts, FRICTION)
     scene, _, asked, _ = planned(holder, settings, holder.squeeze(settings))
     found = {}
     for trial, motion in run_trials(HeldBench(scene, lost_m=body.radius), asked).items():

@@ -28,10 +28,10 @@ from grasp_core.errors import NoForcesError, SolverError
 from grasp_core.execution.grips import STIFFNESS_N_PER_M, TIP_RADIUS_M, Grip, unsqueezed
 from grasp_core.execution.loads import LoadSet
 from grasp_core.execution.squeeze_certificate import (
-    ROUNDING,
+    PROOF_SLACK,
     BestSqueeze,
     Cuts,
-    Rows,
+    SlipRows,
     Survival,
     no_scale,
 )
@@ -42,14 +42,14 @@ from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
 from grasp_core.solvers.ties import first_best, nearest_optimum
 from grasp_core.values import Contact, Grasp
 
-ROUNDS = 60
+MOST_PROGRAMS = 60
 """Most programs that are solved; ten are usual."""
-GAP = 1e-4
+SQUEEZE_GAP = 1e-4
 """Gap between scale and upper bound, relative to it, at which no more rounds follow: the nearest of
 all optima gives up a fifth of it."""
-ABOVE = 1e-4
+ASKED_ABOVE_ONE = 1e-4
 """By how much more than scale one the least push is asked to survive: rows are met to less."""
-AT_REST = 1e-5
+UNUSED_AT_REST = 1e-5
 """Share of the friction that the search leaves unused at rest, where rows are met to less."""
 VALUE = 0.25
 """Value of a program for weak motors, in its own units: optima are told apart by a share of one."""
@@ -111,11 +111,12 @@ def searched(
     survival = Survival.of(start, loads, motors)
     cuts = Cuts.first(len(survival.friction))
     best: _Round | None = None
-    for _ in range(ROUNDS):
+    for _ in range(MOST_PROGRAMS):
         found = _solved(start, loads, survival, cuts, most, motors)
         if best is None or found.gap < best.gap:
             best = found
-        if found.gap <= (GAP if most else GAP + ABOVE) * found.upper + found.nothing:
+        allowed = SQUEEZE_GAP if most else SQUEEZE_GAP + ASKED_ABOVE_ONE
+        if found.gap <= allowed * found.upper + found.nothing:
             break
         start, survival, cuts = found.grip, found.survival, found.more_cuts()
     if best is None or np.isinf(best.gap):
@@ -164,7 +165,7 @@ class _Round:
     def more_cuts(self) -> Cuts:
         """Return the rows so far and those that the squeeze breaks most."""
         slips = self.scales[: len(self.worst.cases)]
-        broken = np.flatnonzero(slips < self.upper * (1.0 - ROUNDING))
+        broken = np.flatnonzero(slips < self.upper * (1.0 - PROOF_SLACK))
         angles = np.append(self.cuts.angles, self.worst.angles[broken])
         return Cuts(angles, np.append(self.cuts.cases, broken))
 
@@ -193,7 +194,7 @@ def _solved(
 def _program(survival: Survival, cuts: Cuts, most: float | None) -> tuple[Array, Array]:
     """Find the nearest optimal squeeze, (k, 3) local [N], and multipliers of all rows."""
     k, change = survival.contacts, np.linalg.norm(survival.change, axis=(1, 2))
-    used = np.repeat([1.0, 1.0 - AT_REST], k)[: len(change)]  # under the loads, and at rest
+    used = np.repeat([1.0, 1.0 - UNUSED_AT_REST], k)[: len(change)]  # under the loads, and at rest
     rows = replace(survival, friction=used * survival.friction).rows(cuts)
     unit = most or max(float(change.max()), float(np.abs(survival.offset).max()))
     program, answer = _optimum(survival, rows, most, unit)
@@ -207,12 +208,12 @@ def _program(survival: Survival, cuts: Cuts, most: float | None) -> tuple[Array,
 
 
 def _optimum(
-    survival: Survival, rows: Rows, most: float | None, unit: float
+    survival: Survival, rows: SlipRows, most: float | None, unit: float
 ) -> tuple[LinearProgram, Optimum]:
     """Solve the program of some rows with forces in a unit [N]."""
     goal = np.append(np.zeros(survival.G.shape[1]), 1.0)
     if most is None:  # the last unknown is minus the limit
-        last, b = rows.d, (rows.b - (1.0 + ABOVE) * rows.c) / unit
+        last, b = rows.d, (rows.b - (1.0 + ASKED_ABOVE_ONE) * rows.c) / unit
     else:
         largest = float(np.linalg.norm(survival.change, axis=(1, 2)).max())
         last, b = rows.c / largest, rows.b / unit + most / unit * rows.d
@@ -259,7 +260,6 @@ def _certified(found: _Round, loads: LoadSet, motors: Motors | None) -> BestSque
 
 
 def _first_reached(found: _Round) -> tuple[int, int, Array]:
-    """Find the contact or the joint that ends the scale, the other being -1, and the place z."""
     survival, numbers = found.survival, np.arange(len(found.scales))
     k, cases = survival.contacts, len(found.worst.cases)
     torques = survival.torques(numbers)[:, 0]

@@ -37,24 +37,24 @@ from grasp_core.closure.contacts import WRENCH
 from grasp_core.execution.first_slip import slip_steps
 from grasp_core.execution.grips import Grip
 
-RATIOS = 10
+LOAD_RATIOS = 10
 """Number of equal ratios from the first slip to the farthest load: ranks of grasps do not improve
 with more."""
-BEFORE = 0.98
+BEFORE_SLIP = 0.98
 """Where the first multiple is, in first slips."""
-FARTHEST = 100.0
+LONGEST_WAY = 100.0
 """Largest ratio of the farthest load to the first slip; smaller first slips are followed from that
 ratio on."""
-HALVINGS = 4
+RATIO_HALVINGS = 4
 """Number of halvings of the last ratio: paths in such steps are no finer than a sixteenth of it."""
-MOST_STEPS = 12
+MOST_BALANCE_STEPS = 12
 """Most steps of Newton's method: where it finds a balance, it mostly takes fewer."""
-PARTS = 8
+WAY_PARTS = 8
 """Number of parts in which a way is gone again on which Newton's method found no balance. It may
 swing between contacts that stick and slip, and then the last digits would decide what is lost."""
-MET = 1e-7
+BALANCE_MET = 1e-7
 """Wrench that is left of (2), relative to the largest force at rest."""
-SINGULAR = 1e-9
+ADDED_STIFFNESS = 1e-9
 """Stiffness that is always added to the matrix of Newton's method, relative to its largest entry:
 it can be solved where everything slips."""
 
@@ -71,7 +71,7 @@ def loss_multiples(grip: Grip, loads: Array, most_m: float, most_rad: float) -> 
     found = sticking.copy()
     beyond = slips < sticking
     if beyond.any():
-        begun = np.maximum(slips, sticking / FARTHEST)[beyond]
+        begun = np.maximum(slips, sticking / LONGEST_WAY)[beyond]
         found[beyond] = _Followed(grip, loads[beyond], reach).losses(begun, sticking[beyond])
     return found
 
@@ -98,10 +98,10 @@ class _Followed:
 
     def losses(self, begun: Array, last: Array) -> Array:
         """Find the multiples at which the object is lost, at most the last, (m,)."""
-        first = BEFORE * begun
-        for part in np.linspace(0.0, 1.0, RATIOS + 1):
+        first = BEFORE_SLIP * begun
+        for part in np.linspace(0.0, 1.0, LOAD_RATIOS + 1):
             self._raise(first * (last / first) ** part)
-        for _ in range(HALVINGS):
+        for _ in range(RATIO_HALVINGS):
             self._raise(0.5 * (self.multiples + self.lost))
         between, room = np.full(len(last), 0.5), self.beyond - self.share
         np.divide(1.0 - self.share, room, out=between, where=np.isfinite(self.beyond))
@@ -118,7 +118,7 @@ class _Followed:
         again = np.flatnonzero(~met)
         if len(again):
             # in parts, each from the balance before
-            ends = np.linspace(self.multiples[own[again]], tried[again], PARTS + 1)[1:, :, None]
+            ends = np.linspace(self.multiples[own[again]], tried[again], WAY_PARTS + 1)[1:, :, None]
             at, moved, found = begun[0][again], begun[1][again], np.ones(len(again), dtype=bool)
             for load in ends * self.loads[own[again]]:
                 at, moved, met_here = self._balanced(at, moved, load)
@@ -142,9 +142,9 @@ class _Followed:
         stiff, maps = grip.response @ grip.grasp_stiffness, grip.local_maps  # D_i and W_i F_i
         softening = grip.grasp_stiffness + np.einsum("kij,kjl->il", maps, stiff)  # C of (2)
         rows, columns = stiff.reshape(-1, WRENCH), maps.transpose(1, 0, 2).reshape(WRENCH, -1)
-        most = MET * float(np.abs(rest).max())
+        most = BALANCE_MET * float(np.abs(rest).max())
         motion, after, found = start.copy(), forces, np.zeros(count, dtype=bool)
-        for _ in range(MOST_STEPS):
+        for _ in range(MOST_BALANCE_STEPS):
             tried = forces + ((motion - start) @ rows.T).reshape(forces.shape)
             after, slope = _returned(tried, grip.friction)
             left: Array = (after - rest).reshape(count, -1) @ columns.T
@@ -155,7 +155,7 @@ class _Followed:
             tangent = (maps @ slope @ stiff).sum(axis=1) - softening
             tangent *= scale[:, None] * scale
             size = np.abs(tangent).max(axis=(1, 2), keepdims=True)
-            tangent -= SINGULAR * size * np.eye(WRENCH)
+            tangent -= ADDED_STIFFNESS * size * np.eye(WRENCH)
             solved = np.asarray(np.linalg.solve(tangent, -(left * scale)[..., None]), dtype=float)
             step = np.where(found[:, None], 0.0, solved[..., 0] * scale)
             # no step is longer than the reach: near the end of balance it would fly

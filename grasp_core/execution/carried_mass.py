@@ -45,7 +45,7 @@ is left of p where motors feel such pushes. The largest push is rounded up, to l
 much, so that last digits do not decide. All slacks are then relative to forces that there can be.
 
 *Rounding of (5).* A product of sums with n terms is off by less than n rounding units of the sum of
-its terms' sizes. h is raised by more than these, `LOST` times such a sum.
+its terms' sizes. h is raised by more than these, `LOST_DIGITS` times such a sum.
 
 *What forces prove.* Forces that meet (1) exactly are next to them; see `allowed_forces`.
 
@@ -115,22 +115,22 @@ from grasp_core.quality.wrench_limits import WrenchBody
 from grasp_core.solvers.ties import first_best, on_grid
 from grasp_core.values import Contact, Grasp
 
-FIRST = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3.0)
+FIRST_RAYS = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3.0)
 """Directions of the first rays, whose hull contains the origin."""
-ROUNDING = 1e-9
+BOUND_SLACK = 1e-9
 """Slack of the unit ball and of the upper bound, relative to them: a thousand times what sums and
 square roots lose of either."""
-LOST = 64.0 * float(np.finfo(np.float64).eps)
+LOST_DIGITS = 64.0 * float(np.finfo(np.float64).eps)
 """Rounding of heights of corners, and of products in (5) and (6): sums in them have six components
 of a wrench, three of each contact or one of each joint, a few tens in all."""
-GAP = 1e-3
+MASS_GAP = 1e-3
 """Gap between the bounds, relative to the lower one, at which no more rays follow."""
-FINEST_GAP = 1e-4
+FINEST_MASS_GAP = 1e-4
 """Smallest gap that may be asked for: more rays than are cast would be needed below it."""
-RAYS = 500
+MOST_RAYS = 500
 """Most rays, ten times as many as are usual: twenty to forty bring the bounds to 1e-3 of each
 other, and to 1e-4, with motors and without."""
-NOTHING, HARDLY = 1e-6, 1e-9
+NO_WEIGHT, TINY_PUSH = 1e-6, 1e-9
 """Weight that is none, over the largest of the forces that hold it, and over the largest push:
 programs' forces are balanced to a tenth of the former, and known to a tenth of the latter."""
 WEAKER, TIMES = 1e-3, 3
@@ -158,7 +158,7 @@ def ball_in(points: Array, triangles: Indices) -> float:
     normals = cross(b - a, c - a)
     normals *= np.where((normals * a).sum(axis=1) < 0.0, -1.0, 1.0)[:, None]
     shown = trusted(InnerPolytope, forces=points, corners=triangles, normals=normals)
-    return shown.radius_between(points) - LOST * float(np.linalg.norm(points, axis=1).max())
+    return shown.radius_between(points) - LOST_DIGITS * float(np.linalg.norm(points, axis=1).max())
 
 
 @declared
@@ -216,11 +216,11 @@ class HandPayload(Declared):
                 return False
             hand = replace(self.hand)  # without what it has kept
             most = hand.most(self.facet, self.motor_multipliers)
-            if not most <= self.upper * (1.0 + ROUNDING):
+            if not most <= self.upper * (1.0 + BOUND_SLACK):
                 return False
             if self.lower == 0.0:  # claims nothing, by nothing
                 return not (len(self.gravities) or len(self.triangles))
-            covered = ball_in(self.gravities, self.triangles) >= 1.0 - ROUNDING  # (3)
+            covered = ball_in(self.gravities, self.triangles) >= 1.0 - BOUND_SLACK  # (3)
             return covered and hand.holds(self.lower, self.gravities, self.forces)
 
     def _is_consistent(self) -> bool:
@@ -256,7 +256,7 @@ class CarryingHand(Declared):
         left, sizes = sums - multipliers @ levers, sums + np.abs(multipliers) @ np.abs(levers)
         cones = WrenchSet(np.zeros((WRENCH, 3 * k)), self.friction, "linf")
         felt = np.array([cones.reach(row)[0] for row in left])
-        felt += LOST * (1.0 + float(self.friction.max())) * sizes.sum(axis=1)
+        felt += LOST_DIGITS * (1.0 + float(self.friction.max())) * sizes.sum(axis=1)
         strengths = self.motors.limits + np.linalg.norm(self.weights, axis=1)
         allowed = self.max_push_n * felt + np.abs(multipliers) @ strengths
         most = float(np.minimum(allowed[:k], allowed[k]).max())
@@ -269,7 +269,6 @@ class CarryingHand(Declared):
         return WrenchBody(self.arms, self.normals, self.friction, self.push_n, self.motors)
 
     def _is_consistent(self) -> bool:
-        """Return whether the fields are those of contacts, and of motors that carry their links."""
         k = len(self.friction)
         return (
             k > 0
@@ -333,16 +332,16 @@ class Ray:
     def nothing(self) -> float:
         """Mass that is none beside the forces [kg]."""
         largest = float(np.linalg.norm(self.forces, axis=1).max())
-        return max(NOTHING * largest, HARDLY * self.push_n) / GRAVITY_M_PER_S2
+        return max(NO_WEIGHT * largest, TINY_PUSH * self.push_n) / GRAVITY_M_PER_S2
 
 
-def carried_mass(hand: CarryingHand, gap: float = GAP) -> HandPayload:
+def carried_mass(hand: CarryingHand, gap: float = MASS_GAP) -> HandPayload:
     """Bound the mass that a hand holds in every orientation, by rays until the bounds meet."""
-    number(gap, "gap", ge=FINEST_GAP, lt=1.0)
+    number(gap, "gap", ge=FINEST_MASS_GAP, lt=1.0)
     found, weakest = _searched(hand, gap)
     push, none = hand.push_n, _nothing_held(hand, weakest)
     for _ in range(TIMES):
-        if found.upper <= max((1.0 + 2.0 * gap) * found.lower, HARDLY * push / GRAVITY_M_PER_S2):
+        if found.upper <= max((1.0 + 2.0 * gap) * found.lower, TINY_PUSH * push / GRAVITY_M_PER_S2):
             break
         push = max(WEAKER * push, SMALLEST)
         lower, _ = _searched(replace(hand, max_push_n=push), gap)
@@ -356,11 +355,11 @@ def _searched(hand: CarryingHand, gap: float) -> tuple[HandPayload, Ray]:
     """Bound the mass by rays, with forces as programs know them; and the ray of the upper bound."""
     # no forces are larger than all fingers' together
     mass = hand.push_n * float((1.0 + hand.friction).sum()) / GRAVITY_M_PER_S2
-    rays = [_ray(hand, mass, way) for way in FIRST]
+    rays = [_ray(hand, mass, way) for way in FIRST_RAYS]
     weakest = _weakest(rays)
     # one step of Newton's is enough: the bound is then within 1e-5 of where further steps lead
     if weakest.nothing < weakest.most < mass:
-        rays = [_ray(hand, weakest.most, way) for way in FIRST]
+        rays = [_ray(hand, weakest.most, way) for way in FIRST_RAYS]
         weakest = _weakest([weakest, *rays])
     mass, lowered = rays[0].mass, gap
     while True:
@@ -370,10 +369,10 @@ def _searched(hand: CarryingHand, gap: float) -> tuple[HandPayload, Ray]:
             return _nothing_held(hand, weakest), weakest
         ends, shares = _ends(hand, rays, mass)
         normal, distance, triangles = nearest_facet(ends)
-        if distance >= 1.0 and ball_in(ends, triangles) >= 1.0 - ROUNDING:
+        if distance >= 1.0 and ball_in(ends, triangles) >= 1.0 - BOUND_SLACK:
             forces = shares[:, None, None] * np.array([ray.forces for ray in rays])
             return _held(hand, mass, weakest, ends, forces, triangles), weakest
-        if len(rays) < RAYS:
+        if len(rays) < MOST_RAYS:
             rays.append(_ray(hand, mass, normal / np.linalg.norm(normal)))
             weakest = _weakest([weakest, rays[-1]])
         else:
@@ -517,5 +516,5 @@ def _is_weight(fixed: BestSqueeze) -> bool:
     E = fixed.loads.axes
     ball = np.zeros((WRENCH, WRENCH))
     ball[:3, :3] = GRAVITY_M_PER_S2**2 * np.eye(3)
-    near = bool((np.abs(E @ E.T - ball) <= ROUNDING * GRAVITY_M_PER_S2**2).all())
+    near = bool((np.abs(E @ E.T - ball) <= BOUND_SLACK * GRAVITY_M_PER_S2**2).all())
     return near and not fixed.loads.offset.any()

@@ -17,7 +17,7 @@ the linear model the force along the contact's axes is f + s A w (see `grips`), 
 The finite model follows the equilibrium: at each pose (1) says how far the load can grow if the
 response stays as it is; the load is raised by that, or by as much as moves the object by a small
 step, and the response is taken anew. The steps to the root become Newton's, and the root is met to
-`MET`. A finger with a limit on its push is also checked against it: beyond the limit no closed
+`SLIP_MET`. A finger with a limit on its push is also checked against it: beyond the limit no closed
 grasp is sure to resist (see `wrench_limits`), so that a first slip with limits is never above the
 closure limit.
 
@@ -46,30 +46,30 @@ from grasp_core.execution.grips import Grip, check_grip
 from grasp_core.kinds import LARGEST, SMALLEST, number, one_of
 from grasp_core.quality.motors import Motors, motors_for
 
-SETTLED = 1e-11
+LEFT_WRENCH = 1e-11
 """Largest wrench that is left, relative to the pushes and the load."""
 MOST_NEWTON = 50
 """Newton steps for one load; four or five are usual."""
 Event: TypeAlias = Literal["slip", "push limit", "torque limit", "unstable", "none"]
 """What ends the growth of a load: a contact slips, a finger reaches its limit, a joint its torque,
-the equilibrium is not stable any more, or nothing up to `FARTHEST`."""
-Model: TypeAlias = Literal["finite", "linear"]
+the equilibrium is not stable any more, or nothing up to `LARGEST_LOAD`."""
+SlipModel: TypeAlias = Literal["finite", "linear"]
 """Whether the object's motion is followed, or taken to be small."""
-FARTHEST = 1e6
+LARGEST_LOAD = 1e6
 """Largest load that is tried, in units of the largest push at rest."""
-STEP = 0.02
+LARGEST_STEP = 0.02
 """Largest motion of the object in one step, in arms' lengths or radians."""
-MET = 1e-9
+SLIP_MET = 1e-9
 """How near the load of first slip is met, relative to it."""
-MOST_STEPS = 1000
+MOST_LOAD_STEPS = 1000
 SMALLEST_STEP = 1e-6
 """Part of a step at which the equilibrium ends, rather than that Newton's method fails."""
-AT_REST = 1e-9
+REST_SLACK = 1e-9
 """How far a squeeze may leave a cone or limit at rest, in largest pushes."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Held:
+class Equilibrium:
     """A grip in equilibrium under a load."""
 
     start: Grip  # the grip at rest
@@ -77,21 +77,21 @@ class Held:
     moved: Array  # displacement of the centre of mass, (3,) [m]
     rotation: Array  # orientation of the object against the one at rest, (3, 3)
 
-    def under(self, load: Array) -> "Held":
+    def under(self, load: Array) -> "Equilibrium":
         """Find the equilibrium under a load, starting from this one, under a load nearby."""
         held, scale = self, np.repeat([1.0, self.start.size], 3)
         unit = np.linalg.norm(self.start.squeeze, axis=1).sum()
         unit += float(np.linalg.norm(load / scale))
         for _ in range(MOST_NEWTON):
             left = grasp_map(held.grip.arms) @ held.grip.squeeze.ravel() + load
-            if float(np.abs(left / scale).max()) <= SETTLED * unit:
+            if float(np.abs(left / scale).max()) <= LEFT_WRENCH * unit:
                 return held
             held = held.stepped(held.grip.compliance @ left)
             if not np.isfinite(held.grip.arms).all():
                 break
         raise SolverError("no equilibrium of the loaded grip was found")
 
-    def stepped(self, step: Array) -> "Held":
+    def stepped(self, step: Array) -> "Equilibrium":
         """Move the object by a translation and a turn, and let the tips follow."""
         shift, turn = step[:3], step[3:]
         start, grip, R = self.start, self.grip, rotation(turn)
@@ -108,7 +108,7 @@ class Held:
             Grip, arms=centers + radii * normals, normals=normals, friction=grip.friction,
             squeeze=forces, stiffness=grip.stiffness, tip_radius_m=grip.tip_radius_m,
         )  # fmt: skip
-        return Held(start, turned, moved, R @ self.rotation)
+        return Equilibrium(start, turned, moved, R @ self.rotation)
 
 
 def rotation(turn: Array) -> Array:
@@ -149,7 +149,7 @@ class _Limits:
     push_n: float
     motors: Motors
 
-    def room(self, held: Held, load: Array) -> tuple[Array, Array]:
+    def room(self, held: Equilibrium, load: Array) -> tuple[Array, Array]:
         """Return what is left to limits of pushes and, by (2), of torques, and what load takes."""
         grip, back = held.grip, held.rotation  # rows times R are turned back to the object's axes
         change = grip.response @ load
@@ -165,7 +165,7 @@ def first_slip(
     grip: Grip,
     wrench: ArrayLike,
     *,
-    model: Model = "finite",
+    model: SlipModel = "finite",
     max_push_n: float = math.inf,
     motors: Motors | None = None,
 ) -> FirstSlip:
@@ -191,7 +191,7 @@ def first_slip(
     """
     check_grip(grip)
     load = frozen(wrench, (6,), "wrench")
-    one_of(model, get_args(Model), "model")
+    one_of(model, get_args(SlipModel), "model")
     number(max_push_n, "max_push_n", ge=SMALLEST, le=math.inf)
     if not SMALLEST <= float(np.abs(load).max()) <= LARGEST:
         raise InputError(
@@ -201,7 +201,7 @@ def first_slip(
     limits = _Limits(max_push_n, motors_for(motors, len(grip.friction)))
     _check_rest(grip, max_push_n)
     _check_torques(grip, limits.motors)
-    rest = Held(grip, grip, np.zeros(3), np.eye(3))
+    rest = Equilibrium(grip, grip, np.zeros(3), np.eye(3))
     if not grip.stable:
         return _ended(rest, 0.0, "unstable", -1)
     if model == "finite":
@@ -213,13 +213,13 @@ def first_slip(
     motion = multiple * grip.compliance @ load
     local = grip.local_squeeze + multiple * (grip.response @ load)
     forces = np.einsum("kij,kj->ki", grip.frames, local)
-    moved = Held(grip, grip.squeezed(forces), motion[:3], rotation(motion[3:]))
+    moved = Equilibrium(grip, grip.squeezed(forces), motion[:3], rotation(motion[3:]))
     return _ended(moved, multiple, event, place)
 
 
 def _check_torques(grip: Grip, motors: Motors) -> None:
     torques = motors.torques(grip.squeeze)
-    weak = np.flatnonzero(np.abs(torques) > motors.limits * (1.0 + AT_REST))
+    weak = np.flatnonzero(np.abs(torques) > motors.limits * (1.0 + REST_SLACK))
     if weak.size:
         joint = int(weak[0])
         raise InputError(
@@ -233,7 +233,7 @@ def _check_rest(grip: Grip, max_push_n: float) -> None:
     n, t = grip.local_squeeze[:, 0], np.linalg.norm(grip.local_squeeze[:, 1:], axis=1)
     slack = np.minimum(grip.friction * n - t, np.minimum(n, max_push_n - n))
     worst = int(np.argmin(slack))
-    if slack[worst] < -AT_REST * float(np.abs(n).max()):
+    if slack[worst] < -REST_SLACK * float(np.abs(n).max()):
         raise InputError(
             f"squeeze: contact {worst} of the grip is not held at rest: it pushes with "
             f"{n[worst]:.6g} N (max_push_n is {max_push_n:.6g}) and has {t[worst]:.6g} N across, "
@@ -265,7 +265,7 @@ def _steps_to_cone(local: Array, change: Array, friction: Array) -> Array:
     return np.minimum(np.where(np.isnan(slips), 0.0, slips), lifts)
 
 
-def _next_event(held: Held, load: Array, most: _Limits) -> tuple[float, Event, int]:
+def _next_event(held: Equilibrium, load: Array, most: _Limits) -> tuple[float, Event, int]:
     """Find how much the load grows to the next event, less than zero where it has passed it."""
     grip = held.grip
     slips = _steps_to_cone(grip.local_squeeze, grip.response @ load, grip.friction)
@@ -281,21 +281,21 @@ def _next_event(held: Held, load: Array, most: _Limits) -> tuple[float, Event, i
     return float(slips.min()), "slip", int(np.argmin(slips))
 
 
-def _finite(held: Held, load: Array, most: _Limits) -> FirstSlip:
+def _finite(held: Equilibrium, load: Array, most: _Limits) -> FirstSlip:
     """Follow the equilibrium from rest until something happens, and back where it has happened."""
     reached, part = 0.0, 1.0
-    farthest = FARTHEST * float(held.grip.local_squeeze[:, 0].max()) / float(np.abs(load).max())
-    for _ in range(MOST_STEPS):
+    farthest = LARGEST_LOAD * float(held.grip.local_squeeze[:, 0].max()) / float(np.abs(load).max())
+    for _ in range(MOST_LOAD_STEPS):
         further, event, place = _next_event(held, load, most)
         further = max(further, -reached)
-        is_within = further >= -MET * reached
+        is_within = further >= -SLIP_MET * reached
         if part < SMALLEST_STEP or (is_within and not held.grip.stable):
             return _ended(held, reached, "unstable", -1)
-        if is_within and further <= MET * reached:
+        if is_within and further <= SLIP_MET * reached:
             return _ended(held, reached, event, place)
         motion = held.grip.compliance @ load
         shift = float(np.linalg.norm(motion[:3])) / held.grip.size
-        longest = part * STEP / max(shift, float(np.linalg.norm(motion[3:])))
+        longest = part * LARGEST_STEP / max(shift, float(np.linalg.norm(motion[3:])))
         step = max(min(further, longest), -longest)
         if reached + step > farthest:
             return _ended(held, math.inf, "none", -1)
@@ -308,7 +308,7 @@ def _finite(held: Held, load: Array, most: _Limits) -> FirstSlip:
     raise SolverError("the load of first slip was not met; the grip may be nearly unstable")
 
 
-def _ended(held: Held, multiple: float, event: Event, place: int) -> FirstSlip:
+def _ended(held: Equilibrium, multiple: float, event: Event, place: int) -> FirstSlip:
     joint = place if event == "torque limit" else -1
     contact = place if joint < 0 else -1
     cosine = 0.5 * (float(np.trace(held.rotation)) - 1.0)

@@ -76,7 +76,7 @@ TIP_RADIUS_M = 0.01
 """Radius of a fingertip unless stated: that of a human one, and of many that are sold [m]."""
 STIFF = 1e-9
 """Share of the largest stiffness that is none: two fingers alone leave as little by rounding."""
-BALANCED = 1e-6
+SQUEEZE_BALANCED = 1e-6
 """Largest wrench of a squeeze, relative to the sum of its forces (times the longest arm)."""
 
 
@@ -128,7 +128,6 @@ class Grip(Declared):
         return replace(self, squeeze=squeeze)
 
     def _is_consistent(self) -> bool:
-        """Return whether the fields are those of contacts whose squeeze balances."""
         plain = replace(self)  # without what it has kept, which may be anything
         return (
             len(self.friction) >= LEAST_CONTACTS and are_springs(self.stiffness) and plain.balanced
@@ -151,9 +150,9 @@ class Grip(Declared):
 
     @property
     def balanced(self) -> bool:
-        """Whether the squeeze balances, to within `BALANCED`."""
+        """Whether the squeeze balances, to within `SQUEEZE_BALANCED`."""
         total = float(np.linalg.norm(self.squeeze, axis=1).sum())
-        return self.imbalance <= BALANCED * total
+        return self.imbalance <= SQUEEZE_BALANCED * total
 
     @cached_property
     def frames(self) -> Array:

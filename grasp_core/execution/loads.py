@@ -60,15 +60,14 @@ from grasp_core.kinds import LARGEST, SMALLEST, Quantity, number, value_of
 from grasp_core.solvers.ties import first_best
 
 GRAVITY_M_PER_S2 = 9.80665
-"""Standard gravity."""
 VANISHING = 1e-9
 """Size of the first coefficient of (6), relative to the largest, that takes the place of a smaller
 one: roots move by as much, and (4) by its square."""
 FIRST_ANGLE = -0.1
 """Where angles are counted from, far from those of symmetric grasps [rad]."""
-HALVINGS = 50
+MULTIPLIER_HALVINGS = 50
 """Halvings of the interval of a multiplier, down to rounding."""
-ROUNDING = 1e-12
+EIGENVALUE_SLACK = 1e-12
 """Least eigenvalue of (5) that counts as none, relative to its largest entry: a thousand times
 what rounding leaves. Forces near the tip of a cone may leave it by its root, a millionth."""
 
@@ -192,16 +191,16 @@ class Reactions:
     def survives(self, scale: float, multipliers: Array) -> bool:
         """Return whether multipliers tau, (k,) [N^2], prove by (5) that no contact slips."""
         M, ball = self._certificates(scale)
-        pressed = self.start[:, 0] >= scale * self.swing * (1.0 - ROUNDING)
+        pressed = self.start[:, 0] >= scale * self.swing * (1.0 - EIGENVALUE_SLACK)
         least = np.linalg.eigvalsh(M - multipliers[:, None, None] * ball)[:, 0]
-        allowed = ROUNDING * np.abs(M).max(axis=(1, 2))
+        allowed = EIGENVALUE_SLACK * np.abs(M).max(axis=(1, 2))
         return bool((pressed & (multipliers >= 0.0) & (least >= -allowed)).all())
 
     def multipliers(self, scale: float) -> Array:
         """Find tau for `survives`, (k,) [N^2]: those with the largest least eigenvalue of (5)."""
         M, ball = self._certificates(scale)
         low, high = np.zeros(len(M)), np.maximum(M[:, 0, 0], 0.0)
-        for _ in range(HALVINGS):
+        for _ in range(MULTIPLIER_HALVINGS):
             middle = 0.5 * (low + high)
             # the least eigenvalue changes by minus its vector's form of the ball
             least = np.linalg.eigh(M - middle[:, None, None] * ball)[1][..., 0]

@@ -54,15 +54,15 @@ from grasp_core.execution.loads import LoadSet, Reactions
 from grasp_core.kinds import NotNegative
 from grasp_core.quality.motors import Motors, motors_for
 
-ROUNDING = 1e-9
+PROOF_SLACK = 1e-9
 """Slack of pushes, of torques and of the upper bound, relative to them."""
-STARTS = 8
+FIRST_ANGLES = 8
 """Tangent directions of each case in the first program."""
 BOUNDING = 1e-6
 """Least c.y of (4), relative to |c| |y|, that bounds the scale."""
-NEAR = 1e-5
+SLIP_NEAR = 1e-5
 """Share by which a load larger than the worst makes a contact slip, or a joint reach its torque."""
-NONE = 1e-9
+NO_SCALE = 1e-9
 """Scale that is none, in pushes over the change of contact forces at scale one."""
 
 
@@ -77,12 +77,12 @@ class Cuts(Declared):
     @classmethod
     def first(cls, count: int) -> "Cuts":
         """Return evenly spread rows of each of `count` cases."""
-        angles = np.tile(np.linspace(0.0, 2.0 * np.pi, STARTS, endpoint=False), count)
-        return cls(angles, np.repeat(np.arange(count), STARTS))
+        angles = np.tile(np.linspace(0.0, 2.0 * np.pi, FIRST_ANGLES, endpoint=False), count)
+        return cls(angles, np.repeat(np.arange(count), FIRST_ANGLES))
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
+class SlipRows:
     """Rows R f + start + s |way| <= most + N d in local squeezes f (3k,), scale s, push limit N.
 
     They are rows (1), then both of (2) for all cases, then (3) in one direction and in the other,
@@ -123,7 +123,7 @@ class Rows:
         limits, taken = self.limits(max_push_n), self.c
         room = limits - self.reached(local)
         scales = np.where(taken > 0.0, room / np.where(taken > 0.0, taken, 1.0), np.inf)
-        return np.where(room >= -ROUNDING * limits, scales, -np.inf)
+        return np.where(room >= -PROOF_SLACK * limits, scales, -np.inf)
 
     def worst_of(self, row: int) -> Array:
         """Find the z, of unit length, whose load takes most of a row, (m,)."""
@@ -186,7 +186,7 @@ class Survival:
         """Compute the forces of all cases with a squeeze in the contacts' frames, (k, 3) [N]."""
         return Reactions(np.tile(local, (self.groups, 1)) + self.offset, self.change, self.friction)
 
-    def rows(self, cuts: Cuts) -> Rows:
+    def rows(self, cuts: Cuts) -> SlipRows:
         """Build the rows (1) at some angles, and all of (2) and (3)."""
         r, count, k = len(cuts.cases), len(self.friction), self.contacts
         squeezes = np.tile(np.eye(3 * k).reshape(k, 3, 3 * k), (self.groups, 1, 1))
@@ -194,7 +194,7 @@ class Survival:
         limits = np.tile(self.motors.limits, 2 * self.groups)
         limited = np.zeros(r + 2 * count + len(limits))
         limited[r : r + count] = 1.0
-        return Rows(
+        return SlipRows(
             self._sums(cuts, squeezes),
             self._sums(cuts, self.offset[:, :, None])[:, 0] + np.concatenate([none, links, -links]),
             self._sums(cuts, self.change), np.append(none, limits), limited,
@@ -209,7 +209,7 @@ class Survival:
         torques = (self.motors.levers @ stacked).reshape(-1, forces.shape[2])
         return np.concatenate([cones, pushes, -pushes, torques, -torques])
 
-    def bound(self, rows: Rows, multipliers: Array, balance: Array, max_push_n: float) -> float:
+    def bound(self, rows: SlipRows, multipliers: Array, balance: Array, max_push_n: float) -> float:
         """Bound by (4) the scale that any squeeze with this response survives; infinite if none."""
         # multipliers of any length mean the same
         multipliers, balance = of_order_one(multipliers, balance)
@@ -309,7 +309,7 @@ class BestSqueeze(Declared):
         return (
             self._survives(survival, rows)
             and self._ends(survival, rows)
-            and upper <= self.upper * (1.0 + ROUNDING)
+            and upper <= self.upper * (1.0 + PROOF_SLACK)
         )
 
     def _fits(self, survival: Survival) -> bool:
@@ -327,18 +327,18 @@ class BestSqueeze(Declared):
             and len(self.proofs) == cases
             and named
             and len(self.direction) == self.loads.axes.shape[1]
-            and abs(float(np.linalg.norm(self.direction)) - 1.0) <= ROUNDING
+            and abs(float(np.linalg.norm(self.direction)) - 1.0) <= PROOF_SLACK
         )
 
-    def _survives(self, survival: Survival, rows: Rows) -> bool:
+    def _survives(self, survival: Survival, rows: SlipRows) -> bool:
         local = self.grip.settled
-        most = rows.limits(self.max_push_n) * (1.0 + ROUNDING)
+        most = rows.limits(self.max_push_n) * (1.0 + PROOF_SLACK)
         within = (rows.reached(local, self.scale) <= most)[rows.limited]
         # the S-lemma proves all else: cones, and pushes from below
         return bool(within.all()) and survival.reactions(local).survives(self.scale, self.proofs)
 
-    def _ends(self, survival: Survival, rows: Rows) -> bool:
-        further = self.scale * (1.0 + NEAR) + no_scale(survival, self.max_push_n)
+    def _ends(self, survival: Survival, rows: SlipRows) -> bool:
+        further = self.scale * (1.0 + SLIP_NEAR) + no_scale(survival, self.max_push_n)
         if self.joint >= 0:
             under = rows.reached(self.grip.settled) + rows.way @ (further * self.direction)
             beyond = survival.torques(under) >= survival.motors.limits
@@ -351,6 +351,6 @@ class BestSqueeze(Declared):
 
 
 def no_scale(survival: Survival, max_push_n: float) -> float:
-    """Return the scale that is none, `NONE` of what changes a contact force by the largest push."""
+    """Return the scale that is none, a share of what changes a force by the largest push."""
     largest = float(np.linalg.norm(survival.change, axis=(1, 2)).max())
-    return NONE * max_push_n / largest if largest > 0.0 else 0.0
+    return NO_SCALE * max_push_n / largest if largest > 0.0 else 0.0

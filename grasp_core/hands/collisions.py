@@ -14,13 +14,13 @@ import numpy as np
 from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import compiled
 from grasp_core.frames import POSE_SIZE
-from grasp_core.hands.hand import PALM, SAME, Hand
+from grasp_core.hands.hand import FILE_DIGITS, PALM_NAME, Hand
 from grasp_core.hands.hand_arrays import HandArrays, SurfaceTree, hand_arrays, places
 from grasp_core.objects.polyhedron import Polyhedron
 
-KERNEL = "grasp_core.hands.collisions_kernel"
-LEAF = 4  # largest number of triangles of a node without children
-FAR = 0.02  # distance up to which clearances are measured [m]
+COLLISIONS = "grasp_core.hands.collisions_kernel"
+LEAF_TRIANGLES = 4  # largest number of triangles of a node without children
+FAR_M = 0.02  # distance up to which clearances are measured
 
 
 @lru_cache(maxsize=8)
@@ -42,7 +42,7 @@ def surface_tree(body: Polyhedron) -> SurfaceTree:
     ahead = [(add(0, len(order)), 0, len(order))]
     while ahead:
         node, first, end = ahead.pop()
-        if end - first <= LEAF:
+        if end - first <= LEAF_TRIANGLES:
             continue
         at = middles[order[first:end]]
         axis = int(np.argmax(np.ptp(at, axis=0)))
@@ -64,12 +64,12 @@ def surface_tree(body: Polyhedron) -> SurfaceTree:
 
 @dataclass(frozen=True, slots=True)
 class Clearances:
-    """Least distances of a hand's parts, negative where they overlap, at most `FAR` [m]."""
+    """Least distances of a hand's parts, negative where they overlap, at most `FAR_M` [m]."""
 
     itself: float  # between links that must not overlap
     object: float  # from the object, of all shapes but those that stand for touching fingertips
     tips: float  # from the object, of those fingertips: zero where they touch
-    table: float  # from the table; `FAR` where there is none
+    table: float  # from the table; `FAR_M` where there is none
 
 
 def clearances(
@@ -77,18 +77,18 @@ def clearances(
     up: Array | None = None, height: float = 0.0,
 ) -> Clearances:  # fmt: skip
     """Measure the distances of a hand from itself, an object and a table."""
-    kernel, tree = compiled(KERNEL), surface_tree(body)
+    kernel, tree = compiled(COLLISIONS), surface_tree(body)
     shapes = _shapes(hand, joints, palm_pose)
     touching = np.isin(shapes[0].shape_tips, fingers)
     never = np.full(len(touching), -np.inf)
     apart = [
-        kernel.of_object(*shapes, tree, np.where(left_out, never, FAR))
+        kernel.of_object(*shapes, tree, np.where(left_out, never, FAR_M))
         for left_out in (touching, ~touching)
     ]
-    low = FAR if up is None else kernel.of_table(*shapes, up, height)
-    own = kernel.of_itself(*shapes, FAR)
+    low = FAR_M if up is None else kernel.of_table(*shapes, up, height)
+    own = kernel.of_itself(*shapes, FAR_M)
     return Clearances(
-        min(own, FAR), min(apart[0], 0.0) + FAR, min(apart[1], 0.0) + FAR, min(low, FAR)
+        min(own, FAR_M), min(apart[0], 0.0) + FAR_M, min(apart[1], 0.0) + FAR_M, min(low, FAR_M)
     )
 
 
@@ -100,12 +100,12 @@ def tip_gaps(
     Also gives where they are nearest, or deepest: points of tips' hulls, which are the middles of
     balls, and of the surface, (k, 3) each [m].
     """
-    kernel, tree = compiled(KERNEL), surface_tree(body)
+    kernel, tree = compiled(COLLISIONS), surface_tree(body)
     arrays, turned, middles = _shapes(hand, joints, palm_pose)
     near, other, apart = *np.empty((2, len(fingers), 3)), np.empty(len(fingers))
     for k, finger in enumerate(fingers):
         apart[k] = kernel.tip_surface(arrays, turned, middles, tree, finger, near[k], other[k])
-        if apart[k] <= SAME:
+        if apart[k] <= FILE_DIGITS:
             s = arrays.tip_shapes[finger]
             corners, _ = kernel.core_in(arrays, turned[s], middles[s], s)
             apart[k] = kernel.deepest(corners, tree, near[k], other[k])
@@ -116,7 +116,7 @@ def tip_distances(
     hand: Hand, joints: Array, palm_pose: Array, fingers: Iterable[int], points: Array
 ) -> Array:
     """Measure how far points are from fingertips: zero where these touch them, (k,) [m]."""
-    kernel, (arrays, turned, middles) = compiled(KERNEL), _shapes(hand, joints, palm_pose)
+    kernel, (arrays, turned, middles) = compiled(COLLISIONS), _shapes(hand, joints, palm_pose)
     apart: list[float] = []
     for finger, point in zip(fingers, points, strict=True):
         s = arrays.tip_shapes[finger]
@@ -129,7 +129,7 @@ def _shapes(hand: Hand, joints: Array, palm_pose: Array) -> tuple[HandArrays, Ar
     """Return the arrays of a hand, and the axes and middles of its shapes where it stands."""
     found, arrays = places(hand, joints, palm_pose), hand_arrays(hand)
     turned, middles = np.empty_like(arrays.shape_rotations), np.empty_like(arrays.shape_positions)
-    compiled(KERNEL).place_shapes(
+    compiled(COLLISIONS).place_shapes(
         arrays, palm_pose[:3, :3].copy(), palm_pose[:3, 3].copy(), found.link_rotations[0],
         found.link_positions[0], turned, middles,
     )  # fmt: skip
@@ -138,8 +138,9 @@ def _shapes(hand: Hand, joints: Array, palm_pose: Array) -> tuple[HandArrays, Ar
 
 def overlapping_pairs(hand: Hand, joints: Array) -> set[tuple[str, str]]:
     """Return the names of links, in order of the alphabet, that overlap at some joint angles."""
-    kernel, (arrays, turned, middles) = compiled(KERNEL), _shapes(hand, joints, np.eye(POSE_SIZE))
-    names = [PALM, *(link.name for link in hand.links)]
+    kernel = compiled(COLLISIONS)
+    arrays, turned, middles = _shapes(hand, joints, np.eye(POSE_SIZE))
+    names = [PALM_NAME, *(link.name for link in hand.links)]
     found, way, point = set[tuple[str, str]](), np.empty(3), np.empty(3)
     for i, j in arrays.pairs.tolist():
         if kernel.pair_distance(arrays, turned, middles, i, j, 0.0, way, point) <= 0.0:

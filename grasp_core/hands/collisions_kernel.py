@@ -18,12 +18,13 @@ from grasp_core.hands.distances_kernel import (
 )
 from grasp_core.hands.hand_arrays import HandArrays, SurfaceTree
 
-INSIDE = 0.5  # windings of a surface around a point from which the point counts as inside
-ROUNDING = 1e-9
+INSIDE_WINDINGS = 0.5  # windings of a surface around a point from which the point counts as inside
+DISTANCE_SLACK = 1e-9
 """Distance beyond a limit from which a quick bound on a distance decides, up to which hulls
 overlap, and by which links of a posture may be nearer than is asked for [m]."""
-FACES, AXES = 6, 15  # normals that may separate two boxes, and all axes, with those from edges
-PARALLEL = 1e-10
+FACE_AXES, BOX_AXES = 6, 15
+"""Normals that may separate two boxes, and all axes, with those from edges."""
+PARALLEL_EDGES = 1e-10
 """Sine of the angle between edges below which their cross product is no axis."""
 
 
@@ -54,7 +55,7 @@ def moved(R: Array, p: Array, local: Array, out: Array) -> None:
 
 
 @loop()
-def chains(
+def place_links(
     hand: HandArrays, palm_rotation: Array, palm_position: Array, angles: Array, R: Array, p: Array,
     W: Array,
 ) -> None:  # fmt: skip
@@ -117,13 +118,13 @@ def _separation(
     """
     widest, one, other = -np.inf, turned[i].T.copy(), turned[j].T.copy()
     between, axis = middles[j] - middles[i], np.empty(3)
-    for n in range(AXES):
-        if n < FACES:
+    for n in range(BOX_AXES):
+        if n < FACE_AXES:
             copy(one[n // 2] if n % 2 == 0 else other[n // 2], axis)
         else:
             cross(one[n % 3], other[n // 3 - 2], axis)
             length = np.sqrt(dotted(axis, axis))
-            if length < PARALLEL:
+            if length < PARALLEL_EDGES:
                 continue
             for k in range(3):
                 axis[k] /= length
@@ -171,8 +172,8 @@ def pair_distance(
     hulls overlap, it is the least way by which their boxes, or what covers blocks, come apart.
     """
     radii = hand.shape_radii[i] + hand.shape_radii[j]
-    apart = _separation(hand, turned, middles, i, j, limit + radii + ROUNDING, way) - radii
-    if apart > limit + ROUNDING:
+    apart = _separation(hand, turned, middles, i, j, limit + radii + DISTANCE_SLACK, way) - radii
+    if apart > limit + DISTANCE_SLACK:
         return apart
     corners, own = core_in(hand, turned[i], middles[i], i)
     others, rounding = core_in(hand, turned[j], middles[j], j)
@@ -180,7 +181,7 @@ def pair_distance(
     exact = hull_hull(corners, others, limit + both, near, point)
     if exact > limit + both:
         return exact - both
-    if exact > ROUNDING:
+    if exact > DISTANCE_SLACK:
         apart, length = exact - both, np.sqrt(squared(near, point))
         for k in range(3):
             way[k] = (point[k] - near[k]) / length
@@ -228,7 +229,7 @@ def deepest(corners: Array, tree: SurfaceTree, near: Array, other: Array) -> flo
     for c in range(len(corners)):
         nearest(corners[c], np.inf, tree, at)
         away = np.sqrt(squared(corners[c], at))
-        if windings(corners[c], tree.corners) > INSIDE:
+        if windings(corners[c], tree.corners) > INSIDE_WINDINGS:
             away = -away
         if away < best:
             best = away
@@ -253,9 +254,9 @@ def of_object(
             continue
         corners, rounding = core_in(hand, turned[s], middles[s], s)
         apart = hull_surface(corners, needs[s] + rounding, tree, near, other)
-        if (low < corners[0]).all() and (corners[0] < high).all() and apart > ROUNDING:
-            apart = 0.0 if windings(corners[0], tree.corners) > INSIDE else apart
-        best = min(best, apart - rounding - needs[s] if apart > ROUNDING else -tree.radii[0])
+        if (low < corners[0]).all() and (corners[0] < high).all() and apart > DISTANCE_SLACK:
+            apart = 0.0 if windings(corners[0], tree.corners) > INSIDE_WINDINGS else apart
+        best = min(best, apart - rounding - needs[s] if apart > DISTANCE_SLACK else -tree.radii[0])
     return best
 
 
@@ -282,7 +283,7 @@ def free_postures(
     for n in range(len(angles)):
         if found == len(kept):
             break
-        chains(hand, eye, zero, angles[n], R, p, W)
+        place_links(hand, eye, zero, angles[n], R, p, W)
         middle[:] = 0.0
         for f in range(fingers):
             last = hand.starts[f + 1] - 1
@@ -296,7 +297,7 @@ def free_postures(
             continue
         place_shapes(hand, eye, zero, R, p, turned, middles)
         # parts may be built as near to each other as that
-        if of_itself(hand, turned, middles, apart) >= apart - ROUNDING:
+        if of_itself(hand, turned, middles, apart) >= apart - DISTANCE_SLACK:
             kept[found] = n
             found += 1
     return found

@@ -40,6 +40,7 @@ half a block's width, stands for a block where a tip has to be a ball.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import accumulate
 from pathlib import Path
 from typing import Annotated
 
@@ -60,21 +61,21 @@ from grasp_core.messages import UnfitError, shown
 from grasp_core.names import HANDS
 
 LARGEST_SIZE = 2.0  # largest length of a hand [m]: a larger one is in other units
-MOST_TURN = 2.0 * np.pi  # largest angle of a joint, in either direction [rad]
+LARGEST_ANGLE = 2.0 * np.pi  # largest angle of a joint, in either direction [rad]
 FEWEST_FINGERS, MOST_FINGERS = 3, 5
-MOST_LINKS, MOST_SHAPES, MOST_CORNERS = 40, 400, 200
+MOST_HAND_LINKS, MOST_SHAPES, MOST_TIP_CORNERS = 40, 400, 200
 """Largest numbers of links and shapes of a hand, and of corners of a fingertip."""
 LEAST_ROUNDING = 5e-5
 """Least rounding of a fingertip [m]: the way from its hull to a surface must be a direction when it
 touches to 10 um."""
-SAME = 1e-9
+FILE_DIGITS = 1e-9
 """Difference below which two lengths [m], or angles [rad], count as equal: the rounding of a file.
 """
 RIGID_SLACK = 1e-9
 """How far the rows of a rotation may be from orthonormal: the rounding of ten digits."""
-LARGEST_RATIO, SMALLEST_RATIO, LARGEST_OFFSET = 100.0, 0.01, 100.0
+MOST_RATIO, LEAST_RATIO, MOST_OFFSET = 100.0, 0.01, 100.0
 """Sizes of ratios and offsets of couplings, which keep (2) exact to rounding."""
-PALM = "palm"  # name of the palm among the links
+PALM_NAME = "palm"  # name of the palm among the links
 
 
 def _turn(turned: Array) -> Array:
@@ -86,21 +87,21 @@ def _turn(turned: Array) -> Array:
 
 
 Rotation = Annotated[Array, Shape(3, 3), AfterValidator(_turn)]
-Place = Annotated[Array, Shape(3, least=-LARGEST_SIZE, most=LARGEST_SIZE)]
+HandPoint = Annotated[Array, Shape(3, least=-LARGEST_SIZE, most=LARGEST_SIZE)]
 """A point of a hand, (3,) [m]."""
-Corners = Annotated[
-    Array, Shape(None, 3, least=-LARGEST_SIZE, most=LARGEST_SIZE), Len(2, MOST_CORNERS)
+TipCorners = Annotated[
+    Array, Shape(None, 3, least=-LARGEST_SIZE, most=LARGEST_SIZE), Len(2, MOST_TIP_CORNERS)
 ]  # fmt: skip
 """Two or more points of a hand, (m, 3) [m]: one corner would make a ball."""
-Length = Annotated[float, Interval(ge=0.0, le=LARGEST_SIZE)]
-Angle = Annotated[float, Interval(ge=-MOST_TURN, le=MOST_TURN)]
+HandLength = Annotated[float, Interval(ge=0.0, le=LARGEST_SIZE)]
+Angle = Annotated[float, Interval(ge=-LARGEST_ANGLE, le=LARGEST_ANGLE)]
 
 
 @declared
 class LinkShape(Declared):
     """All points within `radius` of a box: a box, a capsule or a ball of a link."""
 
-    position: Annotated[Place, Field(alias="position_m")]
+    position: Annotated[HandPoint, Field(alias="position_m")]
     """Middle in the link's frame, (3,) [m]."""
     rotation: Rotation
     """Columns are the box's axes in the link's frame, (3, 3)."""
@@ -108,7 +109,7 @@ class LinkShape(Declared):
         Array, Shape(3, least=0.0, most=LARGEST_SIZE), Field(alias="half_sizes_m")
     ]  # fmt: skip
     """Half the box's lengths along its axes, (3,) [m], each zero or more."""
-    radius: Annotated[Length, Field(alias="radius_m")]
+    radius: Annotated[HandLength, Field(alias="radius_m")]
     """Distance from the box to the surface [m]."""
 
     def _check_together(self) -> None:
@@ -119,7 +120,7 @@ class LinkShape(Declared):
         """Return whether balls about points (n, 3) of the link's frame are within the shape."""
         out = np.abs((points - self.position) @ self.rotation) - self.half_sizes
         away = np.linalg.norm(np.maximum(out, 0.0), axis=1) + np.minimum(out.max(axis=1), 0.0)
-        return bool((away + radius <= self.radius + SAME).all())
+        return bool((away + radius <= self.radius + FILE_DIGITS).all())
 
 
 @declared
@@ -127,7 +128,7 @@ class Joint(Declared):
     """A revolute joint: where it is on the link before it, its axis, range and torque limit."""
 
     name: str
-    position: Annotated[Place, Field(alias="position_m")]
+    position: Annotated[HandPoint, Field(alias="position_m")]
     """Origin of the moved link's frame, in the frame of the link before it, (3,) [m]."""
     rotation: Rotation
     """Axes of that frame at the angle zero, (3, 3)."""
@@ -156,7 +157,7 @@ class Link(Declared):
     shapes: tuple[LinkShape, ...]
     mass_kg: Annotated[float, Interval(ge=0.0, le=1e3)] | None = None
     """Mass [kg]; None where no source states one."""
-    center_of_mass: Annotated[Place | None, Field(alias="center_of_mass_m")] = None
+    center_of_mass: Annotated[HandPoint | None, Field(alias="center_of_mass_m")] = None
     """Centre of mass in the link's frame, (3,) [m]; None where no source states one."""
 
 
@@ -168,13 +169,13 @@ class Fingertip(Declared):
     a tip has to be one: in planning, and in simulations, where it lies at the block's contact.
     """
 
-    center: Annotated[Place, Field(alias="center_m")]
+    center: Annotated[HandPoint, Field(alias="center_m")]
     """Middle of the ball in the last link's frame, (3,) [m]."""
     radius: Annotated[float, Interval(gt=0.0, le=LARGEST_SIZE), Field(alias="radius_m")]
     """Radius of the ball [m]."""
-    corners: Annotated[Corners | None, Field(alias="corners_m")] = None
+    corners: Annotated[TipCorners | None, Field(alias="corners_m")] = None
     """Corners of the block in the last link's frame, (m, 3) [m]; None for a ball."""
-    rounding: Annotated[Length, Field(alias="rounding_m")] = 0.0
+    rounding: Annotated[HandLength, Field(alias="rounding_m")] = 0.0
     """Distance from their hull to the surface of the block [m]; zero for a ball."""
 
     def _check_together(self) -> None:
@@ -227,17 +228,17 @@ class Coupling(Declared):
     """Name of the joint that follows."""
     driver: str
     """Name of the joint that it follows, which follows none itself."""
-    ratio: Annotated[float, Interval(ge=-LARGEST_RATIO, le=LARGEST_RATIO)]
+    ratio: Annotated[float, Interval(ge=-MOST_RATIO, le=MOST_RATIO)]
     """Change of the angle per change of the driver's angle."""
     offset: Annotated[
-        float, Interval(ge=-LARGEST_OFFSET, le=LARGEST_OFFSET), Field(alias="offset_rad")
+        float, Interval(ge=-MOST_OFFSET, le=MOST_OFFSET), Field(alias="offset_rad")
     ] = 0.0
     """Angle where the driver's is zero [rad]."""
 
     def _check_together(self) -> None:
-        if abs(self.ratio) < SMALLEST_RATIO:
+        if abs(self.ratio) < LEAST_RATIO:
             raise InputError(
-                f"ratio must be at least {SMALLEST_RATIO:g} or at most -{SMALLEST_RATIO:g}, got "
+                f"ratio must be at least {LEAST_RATIO:g} or at most -{LEAST_RATIO:g}, got "
                 f"{self.ratio:g} for {self.joint}"
             )
 
@@ -288,7 +289,7 @@ def drives(names: Sequence[str], ranges: Array, couplings: Sequence[Coupling]) -
     for k in np.unique(drivers[drivers != np.arange(j)]).tolist():
         own = np.flatnonzero(drivers == k).tolist()
         low, high = float(ends[own, 0].max()), float(ends[own, 1].min())
-        if low > high + SAME:
+        if low > high + FILE_DIGITS:
             raise InputError(
                 f"ranges must leave an angle to joints that are coupled, got none for "
                 f"{', '.join(names[i] for i in own)}"
@@ -324,12 +325,12 @@ class Hand(Declared):
                 f"fingers must be {FEWEST_FINGERS} to {MOST_FINGERS}, got {len(self.fingers)}"
             )
         shapes = len(self.palm) + sum(len(link.shapes) for link in self.links)
-        if len(self.links) > MOST_LINKS or shapes > MOST_SHAPES:
+        if len(self.links) > MOST_HAND_LINKS or shapes > MOST_SHAPES:
             raise InputError(
-                f"a hand must have at most {MOST_LINKS} links and {MOST_SHAPES} shapes, got "
+                f"a hand must have at most {MOST_HAND_LINKS} links and {MOST_SHAPES} shapes, got "
                 f"{len(self.links)} and {shapes}"
             )
-        names = [PALM, *(link.name for link in self.links)]
+        names = [PALM_NAME, *(link.name for link in self.links)]
         if len(set(names)) < len(names):
             raise InputError("names of links must differ from each other and from 'palm'")
         for pair in self.ignored_pairs:
@@ -346,6 +347,12 @@ class Hand(Declared):
     def joints(self) -> tuple[Joint, ...]:
         """Return the joints in the order of `links`."""
         return tuple(link.joint for link in self.links)
+
+    @property
+    def chains(self) -> tuple[range, ...]:
+        """Return the numbers of each finger's links and joints, from the palm outwards."""
+        ends = list(accumulate(len(finger.links) for finger in self.fingers))
+        return tuple(map(range, [0, *ends[:-1]], ends))
 
     @property
     def drives(self) -> Drives:
@@ -397,7 +404,7 @@ def load_hand(name: str) -> Hand:
 
     Args:
         name: "allegro", "allegro-urdf" (the same with fingertips as in the maker's URDF) or "leap";
-            `scenes.load_hand` also reads files.
+            `scenes.hand_from_file` reads others.
 
     Raises:
         InputError: There is no such hand.
@@ -405,7 +412,7 @@ def load_hand(name: str) -> Hand:
     if value_of(str, name, "name") not in HANDS:
         raise InputError(
             f"name must be that of a built-in hand, {' or '.join(HANDS)}, got {shown(name)}; "
-            "scenes.load_hand(path, fingertips=...) reads files"
+            "scenes.hand_from_file(path, fingertips) reads others"
         )
     found = read_text(Path(__file__).with_name(f"{name}.json"))
     return from_record(Hand, object_of(found, "hand"))

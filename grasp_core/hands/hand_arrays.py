@@ -21,18 +21,19 @@ from grasp_core.arrays import Array, Indices, cross, frozen_copy, real_array
 from grasp_core.compiled import compiled
 from grasp_core.errors import InputError
 from grasp_core.frames import POSE_SIZE
-from grasp_core.hands.hand import PALM, SAME, Hand, HandFinger, LinkShape
+from grasp_core.hands.hand import FILE_DIGITS, PALM_NAME, Hand, HandFinger, LinkShape
+from grasp_core.kinds import Direction, value_of
 
 _Part: TypeAlias = tuple[int, LinkShape]  # a shape with the number of its link
 LEAST_BALL = 0.008
 """Least radius of the balls that stand for a shape while a pose is sought [m]: thinner parts of a
 link lie beside thicker ones."""
-ROUNDED = 1.12
+EDGE_ROUNDED = 1.12
 """Radius of a ball over the smallest half-size of its box: between a ball inside the box and one
 through its edges."""
 BALLS_APART = 1.7
 """Largest distance between neighbouring balls of a shape, in the smallest half-size."""
-OUTSIDE = 0.006
+STICKING_OUT = 0.006
 """How far a ball must stick out of every larger ball of its link to be kept [m]."""
 
 
@@ -107,7 +108,7 @@ class Targets(NamedTuple):
     height: float  # of the table along it; minus infinity for none
 
 
-class Wanted(NamedTuple):
+class Gaps(NamedTuple):
     """Distances that are asked for, and what else counts."""
 
     clear: float  # of balls from the object and the table
@@ -119,7 +120,7 @@ class Wanted(NamedTuple):
     palm_moves: bool
 
 
-class Pose(NamedTuple):
+class HandPose(NamedTuple):
     """A pose of a hand and where its parts are; the loops change the arrays in place."""
 
     palm: Array  # axes of the palm's frame, (3, 3)
@@ -151,8 +152,8 @@ class Sums(NamedTuple):
 def hand_arrays(hand: Hand) -> HandArrays:
     """Lay a hand out as arrays; equal hands share them."""
     links, drives, fingers = hand.links, hand.drives, hand.fingers
-    starts = np.cumsum([0, *(len(finger.links) for finger in fingers)])
-    ends: list[int] = (starts[1:] - 1).tolist()
+    starts = np.array([0, *(chain.stop for chain in hand.chains)])
+    ends = [chain[-1] for chain in hand.chains]
     parts: list[_Part] = [(-1, shape) for shape in hand.palm]
     parts += [(i, shape) for i, link in enumerate(links) for shape in link.shapes]
     parts += [
@@ -209,7 +210,7 @@ def _stands_for(shape: LinkShape, finger: HandFinger, tip: LinkShape) -> bool:
         return shape is tip
     local = (tip.position - shape.position) @ shape.rotation
     out = np.linalg.norm(np.maximum(np.abs(local) - shape.half_sizes, 0.0))
-    return bool(abs(shape.radius - tip.radius) <= SAME and out <= SAME)
+    return bool(abs(shape.radius - tip.radius) <= FILE_DIGITS and out <= FILE_DIGITS)
 
 
 def _reach(shape: LinkShape) -> float:
@@ -223,12 +224,12 @@ def _link_ball(parts: list[_Part], link: int) -> tuple[float, int]:
         (max(math.hypot(*(each.position - shape.position)) + _reach(each) for _, each in own), n)
         for n, shape in own
     )
-    return min(((SAME + reach, number) for reach, number in balls), default=(0.0, -1))
+    return min(((FILE_DIGITS + reach, number) for reach, number in balls), default=(0.0, -1))
 
 
 def _free_links(hand: Hand, starts: Indices) -> NDArray[np.bool_]:
     """Return which links, the palm first, must not overlap, (links + 1, links + 1)."""
-    names = [PALM, *(link.name for link in hand.links)]
+    names = [PALM_NAME, *(link.name for link in hand.links)]
     pairs = [(names.index(one), names.index(other)) for one, other in hand.ignored_pairs]
     for first, end in pairwise(starts.tolist()):
         pairs += pairwise([0, *range(first + 1, end + 1)])
@@ -244,7 +245,7 @@ def _balls(parts: list[_Part]) -> list[tuple[int, Array, float]]:
     for link, shape in parts:
         outer = shape.half_sizes + shape.radius
         inner = max(float(outer.min()), LEAST_BALL)
-        radius = inner if shape.radius > 0.0 else ROUNDED * inner
+        radius = inner if shape.radius > 0.0 else EDGE_ROUNDED * inner
         spans = np.maximum(outer - inner, 0.0)
         counts = np.ceil(2.0 * spans / (BALLS_APART * inner)).astype(int) + 1
         ticks: list[Array] = [
@@ -256,7 +257,7 @@ def _balls(parts: list[_Part]) -> list[tuple[int, Array, float]]:
     kept: list[tuple[int, Array, float]] = []
     for link, center, radius in sorted(found, key=lambda ball: -ball[2]):
         inside = any(
-            link == other and float(np.linalg.norm(center - middle)) + radius <= size + OUTSIDE
+            link == other and float(np.linalg.norm(center - middle)) + radius <= size + STICKING_OUT
             for other, middle, size in kept
         )
         if not inside:
@@ -291,7 +292,7 @@ def places(hand: Hand, joints: ArrayLike, palm_pose: ArrayLike | None = None) ->
     W = np.empty_like(p)
     kernel = compiled("grasp_core.hands.collisions_kernel")
     for own, row, *found in zip(poses, angles, R, p, W, strict=True):
-        kernel.chains(arrays, own[:3, :3].copy(), own[:3, 3].copy(), row, *found)
+        kernel.place_links(arrays, own[:3, :3].copy(), own[:3, 3].copy(), row, *found)
     last = arrays.starts[1:] - 1
     tips = p[:, last] + np.einsum("nfij,fj->nfi", R[:, last], arrays.tip_centers)
     return HandPlaces(*(frozen_copy(each) for each in (R, p, W, tips)))
@@ -311,6 +312,12 @@ def tip_jacobians(hand: Hand, joints: ArrayLike, palm_pose: ArrayLike | None = N
     found, ends = places(hand, joints, palm_pose), hand_arrays(hand).starts[1:] - 1
     each = [jacobian(hand, found, end, found.tips[:, f]) for f, end in enumerate(ends.tolist())]
     return np.stack(each, axis=1)
+
+
+def direction(down: ArrayLike, name: str) -> Array:
+    """Scale a direction to unit length, (3,)."""
+    way = np.array(value_of(Direction, down, name))
+    return way / float(np.linalg.norm(way))
 
 
 def rotation_about(axis: Array, angle: float) -> Array:

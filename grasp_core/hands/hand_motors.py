@@ -47,7 +47,6 @@ A finger needs joints that let its fingertip move in all directions, or L' S L h
 """
 
 from functools import cached_property
-from itertools import pairwise
 from typing import Annotated
 
 import numpy as np
@@ -57,12 +56,12 @@ from grasp_core.arrays import UNIT_SLACK, Array, Shape, cross
 from grasp_core.closure.contacts import WRENCH, contact_frictions, cross_matrix
 from grasp_core.declared import declared
 from grasp_core.errors import InputError
-from grasp_core.execution.carried_mass import GAP, CarryingHand, HandPayload, carried_mass
+from grasp_core.execution.carried_mass import MASS_GAP, CarryingHand, HandPayload, carried_mass
 from grasp_core.execution.grips import Grip
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.hands.hand import Hand
-from grasp_core.hands.hand_arrays import HandPlaces, jacobian, places
-from grasp_core.hands.reach import HandReach, Stance, direction, stance_of
+from grasp_core.hands.hand_arrays import HandPlaces, direction, jacobian, places
+from grasp_core.hands.reach import HandReach, Stance, stance_of
 from grasp_core.kinds import LARGEST, Quantity, value_of
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
@@ -104,7 +103,7 @@ def hand_motors(
 
 
 def _joints(hand: Hand, stance: Stance) -> tuple[HandPlaces, Array, Array]:
-    found, own = places(hand, stance.joints, stance.palm_pose), chains(hand)
+    found, own = places(hand, stance.joints, stance.palm_pose), hand.chains
     levers = np.array([
         jacobian(hand, found, own[finger][-1], contact.position[None])[0].T
         for contact, finger in zip(stance.contacts, stance.fingers, strict=True)
@@ -118,12 +117,6 @@ def _joints(hand: Hand, stance: Stance) -> tuple[HandPlaces, Array, Array]:
     limits = np.array([joint.torque_limit_n_m for joint in hand.free_joints])
     stacked = levers.transpose(1, 0, 2).reshape(len(hand.joints), -1)
     return found, hand.drives.carried(stacked), limits
-
-
-def chains(hand: Hand) -> list[range]:
-    """Return the numbers of each finger's joints."""
-    ends = np.cumsum([0, *(len(finger.links) for finger in hand.fingers)]).tolist()
-    return [range(first, end) for first, end in pairwise(ends)]
 
 
 def _weights(hand: Hand, found: HandPlaces) -> Array:
@@ -148,7 +141,7 @@ def hand_payload(
     friction: ArrayLike,
     *,
     max_push_n: float,
-    gap: float = GAP,
+    gap: float = MASS_GAP,
 ) -> HandPayload:
     """Find the largest mass that a hand holds in every orientation, its own links included.
 
@@ -197,7 +190,6 @@ class HandGrip(Grip):
     """Stiffness k_q of every servo."""
 
     def _is_consistent(self) -> bool:
-        """Return whether the fields are those of contacts and of fingers that can move them."""
         if not (super()._is_consistent() and self.joint_axes.shape[1]):
             return False
         lengths = np.linalg.norm(self.joint_axes, axis=2)
@@ -252,7 +244,7 @@ class HandGrip(Grip):
 def hand_grip(hand: Hand, stance: Stance, loose: Grip, servo_n_m_per_rad: float) -> HandGrip:
     """Hold contacts with the servos of a hand, without a squeeze."""
     found = places(hand, stance.joints, stance.palm_pose)
-    own = [chains(hand)[finger] for finger in stance.fingers]
+    own = [hand.chains[finger] for finger in stance.fingers]
     axes, arms = np.zeros((2, len(own), max(map(len, own)), 3))
     for k, (joints, contact) in enumerate(zip(own, stance.contacts, strict=True)):
         axes[k, : len(joints)] = found.joint_axes[0, joints]

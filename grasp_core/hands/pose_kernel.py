@@ -21,43 +21,43 @@ from grasp_core.arrays_kernel import copy
 from grasp_core.compiled import loop
 from grasp_core.geometry.vectors_kernel import cross, dotted
 from grasp_core.hands.collisions_kernel import (
-    chains,
     core_in,
     is_block,
     may_be_near,
     moved,
     near_links,
     pair_distance,
+    place_links,
     place_shapes,
     product,
     tip_surface,
     turn,
 )
 from grasp_core.hands.distances_kernel import into_frame, nearest, squared
-from grasp_core.hands.hand_arrays import HandArrays, Pose, Sums, SurfaceTree, Targets, Wanted
+from grasp_core.hands.hand_arrays import Gaps, HandArrays, HandPose, Sums, SurfaceTree, Targets
 
-LARGEST_MOVE, LARGEST_TURN = 0.02, 0.35  # largest step [m, rad]
+PALM_MOVE, LARGEST_TURN = 0.02, 0.35  # largest step [m, rad]
 DAMPING = 30.0
 """Added to the squares of the millimetres by which a metre, or a radian, moves what is wrong."""
-STALLED, PATIENCE = 0.02, 4
+STALLED, MOST_STALLED = 0.02, 4
 """A start is given up after so many steps in a row that make the cost smaller by less than this."""
 BACK = 2.5e-4
 """How far the plane of a block is moved at once that overlaps the surface [m]."""
-FREE = 1e-9  # sum of squares below which nothing overlaps [mm^2]
-MOVES = 6  # unknowns of the palm
-OFF, TOUCH, OVERLAP = 0, 1, 2  # places of what `Sums.parts` holds
+NO_OVERLAP = 1e-9  # sum of squares below which nothing overlaps [mm^2]
+OF_PALM = 6  # unknowns of the palm
+OFF_PART, TOUCH_PART, OVERLAP_PART = 0, 1, 2  # places of what `Sums.parts` holds
 MM = 1e3
 EQUAL = 3.0  # weight of touching
 AT_TIP = 1e-6
 """Distance from the middle of a fingertip at which an end of a capsule is that of the tip [m]."""
 ANYWHERE = 10.0  # a distance that is longer than any between a hand and an object [m]
-ON_SURFACE = 1e-9  # distance at which the way to the nearest point is no direction [m]
+NO_DIRECTION = 1e-9  # distance at which the way to the nearest point is no direction [m]
 
 
 @loop()
-def place(hand: HandArrays, targets: Targets, pose: Pose) -> None:
+def place(hand: HandArrays, targets: Targets, pose: HandPose) -> None:
     """Fill in where the links, shapes and fingertips of a pose are."""
-    chains(hand, pose.palm, pose.origin, pose.q, pose.R, pose.p, pose.W)
+    place_links(hand, pose.palm, pose.origin, pose.q, pose.R, pose.p, pose.W)
     place_shapes(hand, pose.palm, pose.origin, pose.R, pose.p, pose.turned, pose.middles)
     for k in range(len(targets.fingers)):
         last = hand.starts[targets.fingers[k] + 1] - 1
@@ -109,7 +109,7 @@ def _ahead(
 
 @loop()
 def _moves(
-    hand: HandArrays, pose: Pose, sums: Sums, link: int, x: Array, along: Array, sign: float,
+    hand: HandArrays, pose: HandPose, sums: Sums, link: int, x: Array, along: Array, sign: float,
     with_palm: bool,
 ) -> None:  # fmt: skip
     """Add to the row the derivative of sign * along.x for a point x of a link, by (1)."""
@@ -127,7 +127,7 @@ def _moves(
         for j in range(3):
             arm[j] = x[j] - pose.p[k, j]
         cross(pose.W[k], arm, way)
-        sums.row[MOVES + hand.drivers[k]] += hand.ratios[k] * sign * dotted(way, along) * MM
+        sums.row[OF_PALM + hand.drivers[k]] += hand.ratios[k] * sign * dotted(way, along) * MM
 
 
 @loop()
@@ -145,7 +145,7 @@ def _add(sums: Sums, part: int, residual: float) -> None:
 
 @loop()
 def _tip(
-    hand: HandArrays, pose: Pose, sums: Sums, link: int, k: int, along: Array, weight: float,
+    hand: HandArrays, pose: HandPose, sums: Sums, link: int, k: int, along: Array, weight: float,
     off: float,
 ) -> None:  # fmt: skip
     """Add a residual of a fingertip, whose derivative is along a direction."""
@@ -157,12 +157,12 @@ def _tip(
         sums.row[3 + j] += weight * rolled[j] * MM
     for a in range(hand.link_firsts[link], link + 1):
         turned = hand.ratios[a] * weight * dotted(pose.W[a], rolled) * MM
-        sums.row[MOVES + hand.drivers[a]] += turned
-    _add(sums, TOUCH, weight * off * MM)
+        sums.row[OF_PALM + hand.drivers[a]] += turned
+    _add(sums, TOUCH_PART, weight * off * MM)
 
 
 @loop(once=True)
-def _touching(hand: HandArrays, targets: Targets, wanted: Wanted, pose: Pose, sums: Sums) -> None:
+def _touching(hand: HandArrays, targets: Targets, wanted: Gaps, pose: HandPose, sums: Sums) -> None:
     """Add the residuals of fingertips: their planes, contacts and regions."""
     for k in range(len(targets.fingers)):
         finger = targets.fingers[k]
@@ -170,23 +170,23 @@ def _touching(hand: HandArrays, targets: Targets, wanted: Wanted, pose: Pose, su
         gap = float(hand.tip_roundings[finger])
         for j in range(3):
             gap += (pose.fronts[k, j] - targets.origins[k, j]) * normal[j]
-        sums.parts[OFF] = max(sums.parts[OFF], abs(gap) * MM)
+        sums.parts[OFF_PART] = max(sums.parts[OFF_PART], abs(gap) * MM)
         _moves(hand, pose, sums, link, pose.fronts[k], normal, EQUAL, True)
-        _add(sums, TOUCH, EQUAL * gap * MM)
+        _add(sums, TOUCH_PART, EQUAL * gap * MM)
         pinned = targets.pinned[k] > 0.0
         for side in range(2):
             tangent, off = targets.tangents[k, side], 0.0
             for j in range(3):
                 off += (pose.tips[k, j] - targets.origins[k, j]) * tangent[j]
             if pinned:
-                sums.parts[OFF] = max(sums.parts[OFF], abs(off) * MM)
+                sums.parts[OFF_PART] = max(sums.parts[OFF_PART], abs(off) * MM)
             _tip(hand, pose, sums, link, k, tangent, EQUAL if pinned else wanted.pull, off)
     for e in range(len(targets.edge_contacts)):
         k, short = targets.edge_contacts[e], wanted.margin
         for j in range(3):
             short -= (pose.tips[k, j] - targets.edge_points[e, j]) * targets.edge_inward[e, j]
         if short > 0.0:
-            sums.parts[OFF] = max(sums.parts[OFF], (short - wanted.margin) * MM)
+            sums.parts[OFF_PART] = max(sums.parts[OFF_PART], (short - wanted.margin) * MM)
             link = int(hand.starts[targets.fingers[k] + 1] - 1)
             _tip(hand, pose, sums, link, k, -targets.edge_inward[e], EQUAL, short)
 
@@ -208,7 +208,7 @@ def _outward(center: Array, need: float, tree: SurfaceTree, along: Array) -> flo
     distance = np.sqrt(dotted(along, along))
     if dotted(along, tree.normals[t]) < 0.0:
         distance = -distance
-    if abs(distance) > ON_SURFACE:
+    if abs(distance) > NO_DIRECTION:
         for j in range(3):
             along[j] /= distance
     else:
@@ -218,17 +218,17 @@ def _outward(center: Array, need: float, tree: SurfaceTree, along: Array) -> flo
 
 @loop()
 def _keep_off(
-    hand: HandArrays, pose: Pose, sums: Sums, link: int, x: Array, along: Array, sign: float,
+    hand: HandArrays, pose: HandPose, sums: Sums, link: int, x: Array, along: Array, sign: float,
     short: float,
 ) -> None:  # fmt: skip
     """Add the residual of a point that must move by `short` against sign * along."""
     _moves(hand, pose, sums, link, x, along, sign, True)
-    _add(sums, OVERLAP, short * MM)
+    _add(sums, OVERLAP_PART, short * MM)
 
 
 @loop(once=True)
 def _balls(
-    hand: HandArrays, tree: SurfaceTree, targets: Targets, wanted: Wanted, pose: Pose, sums: Sums,
+    hand: HandArrays, tree: SurfaceTree, targets: Targets, wanted: Gaps, pose: HandPose, sums: Sums,
 ) -> None:  # fmt: skip
     """Add the residuals of balls that are too near to the object or the table."""
     x, along = np.empty(3), np.empty(3)
@@ -248,7 +248,7 @@ def _balls(
 
 
 @loop(once=True)
-def _links(hand: HandArrays, wanted: Wanted, pose: Pose, sums: Sums) -> None:
+def _links(hand: HandArrays, wanted: Gaps, pose: HandPose, sums: Sums) -> None:
     """Add the residuals of links that are too near to each other."""
     x, along = np.empty(3), np.empty(3)
     near = np.empty((len(hand.link_shapes), len(hand.link_shapes)), np.bool_)
@@ -265,12 +265,12 @@ def _links(hand: HandArrays, wanted: Wanted, pose: Pose, sums: Sums) -> None:
         if short > 0.0:
             _moves(hand, pose, sums, int(hand.shape_links[a]), x, along, 1.0, False)
             _moves(hand, pose, sums, int(hand.shape_links[b]), x, along, -1.0, False)
-            _add(sums, OVERLAP, short * MM)
+            _add(sums, OVERLAP_PART, short * MM)
 
 
 @loop()
 def _farthest(
-    hand: HandArrays, pose: Pose, s: int, origin: Array, way: Array, left_out: Array, x: Array
+    hand: HandArrays, pose: HandPose, s: int, origin: Array, way: Array, left_out: Array, x: Array
 ) -> float:  # fmt: skip
     """Return how far a shape reaches beyond a plane, and fill in its corner there."""
     (corners, rounding), farthest = core_in(hand, pose.turned[s], pose.middles[s], s), -np.inf
@@ -285,7 +285,9 @@ def _farthest(
 
 
 @loop(once=True)
-def _last_links(hand: HandArrays, targets: Targets, wanted: Wanted, pose: Pose, sums: Sums) -> None:
+def _last_links(
+    hand: HandArrays, targets: Targets, wanted: Gaps, pose: HandPose, sums: Sums
+) -> None:
     """Add residuals of last links behind their tips' planes, and of tips over the table."""
     x, down, zero = np.empty(3), -targets.up, np.zeros(3)
     for k in range(len(targets.fingers)):
@@ -313,7 +315,7 @@ def _last_links(hand: HandArrays, targets: Targets, wanted: Wanted, pose: Pose, 
 
 @loop(once=True)
 def residuals(
-    hand: HandArrays, tree: SurfaceTree, targets: Targets, wanted: Wanted, pose: Pose, sums: Sums,
+    hand: HandArrays, tree: SurfaceTree, targets: Targets, wanted: Gaps, pose: HandPose, sums: Sums,
 ) -> None:  # fmt: skip
     """Sum all residuals of a pose, and their products with their derivatives."""
     place(hand, targets, pose)
@@ -328,10 +330,10 @@ def residuals(
 
 
 @loop()
-def empty_pose(hand: HandArrays, contacts: int) -> Pose:
+def empty_pose(hand: HandArrays, contacts: int) -> HandPose:
     """Return arrays for a pose, not filled in."""
     j, s = len(hand.axes), len(hand.shape_links)
-    return Pose(
+    return HandPose(
         np.empty((3, 3)), np.empty(3), np.empty(j), np.empty((j, 3, 3)), np.empty((j, 3)),
         np.empty((j, 3)), np.empty((s, 3, 3)), np.empty((s, 3)), np.empty((contacts, 3)),
         np.empty((contacts, 3)), np.empty((contacts, 3, 3)),
@@ -341,7 +343,7 @@ def empty_pose(hand: HandArrays, contacts: int) -> Pose:
 @loop()
 def empty_sums(hand: HandArrays, targets: Targets) -> Sums:
     """Return arrays for the sums, with the pivot in the contacts' middle."""
-    n, pivot = MOVES + len(hand.axes), np.zeros(3)
+    n, pivot = OF_PALM + len(hand.axes), np.zeros(3)
     for k in range(len(targets.origins)):
         for j in range(3):
             pivot[j] += targets.origins[k, j] / len(targets.origins)
@@ -371,15 +373,15 @@ def _solve(H: Array, g: Array, step: Array) -> None:
 
 
 @loop(once=True)
-def _fill_step(hand: HandArrays, wanted: Wanted, pose: Pose, sums: Sums, step: Array) -> None:
+def _fill_step(hand: HandArrays, wanted: Gaps, pose: HandPose, sums: Sums, step: Array) -> None:
     """Fill in the damped step from a pose, no longer than the largest; uses the sums up."""
     n, H, g = len(step), sums.H, sums.g
     for i in range(n):
         H[i, i] += DAMPING
-        if i < MOVES:
+        if i < OF_PALM:
             held = not wanted.palm_moves
         else:
-            q, low, high = pose.q[i - MOVES], hand.ranges[i - MOVES, 0], hand.ranges[i - MOVES, 1]
+            q, (low, high) = pose.q[i - OF_PALM], hand.ranges[i - OF_PALM]
             held = (q <= low and g[i] > 0.0) or (q >= high and g[i] < 0.0)
         if held:
             for j in range(n):
@@ -388,15 +390,15 @@ def _fill_step(hand: HandArrays, wanted: Wanted, pose: Pose, sums: Sums, step: A
     _solve(H, g, step)
     longest = 1.0
     for i in range(n):
-        longest = max(longest, abs(step[i]) / (LARGEST_MOVE if i < MOVES // 2 else LARGEST_TURN))
+        longest = max(longest, abs(step[i]) / (PALM_MOVE if i < OF_PALM // 2 else LARGEST_TURN))
     for i in range(n):
         step[i] /= longest
 
 
 @loop(once=True)
-def _take(hand: HandArrays, pose: Pose, pivot: Array, step: Array) -> None:
+def _take(hand: HandArrays, pose: HandPose, pivot: Array, step: Array) -> None:
     """Take a step with palm and joints, within ranges and as they are coupled."""
-    about, turned = np.empty((3, 3)), step[3:MOVES]
+    about, turned = np.empty((3, 3)), step[3:OF_PALM]
     angle = np.sqrt(dotted(turned, turned))
     turn(turned / angle if angle > 0.0 else np.zeros(3), angle, about)
     product(about, pose.palm.copy(), pose.palm)
@@ -404,7 +406,7 @@ def _take(hand: HandArrays, pose: Pose, pivot: Array, step: Array) -> None:
     for j in range(3):
         pose.origin[j] += step[j]
     for k in range(len(pose.q)):
-        angle = pose.q[k] + step[MOVES + k]
+        angle = pose.q[k] + step[OF_PALM + k]
         pose.q[k] = min(max(angle, hand.ranges[k, 0]), hand.ranges[k, 1])
     for k in range(len(pose.q)):  # the angles of free joints stay as they are
         angle = hand.offsets[k] + hand.ratios[k] * pose.q[hand.drivers[k]]
@@ -413,7 +415,7 @@ def _take(hand: HandArrays, pose: Pose, pivot: Array, step: Array) -> None:
 
 @loop()
 def settle(
-    hand: HandArrays, tree: SurfaceTree, targets: Targets, wanted: Wanted, pose: Pose, sums: Sums,
+    hand: HandArrays, tree: SurfaceTree, targets: Targets, wanted: Gaps, pose: HandPose, sums: Sums,
     most_steps: int, good: float,
 ) -> None:  # fmt: skip
     """Move a hand until it touches and overlaps no more, or is given up.
@@ -424,11 +426,11 @@ def settle(
     step, stalled, least = np.empty_like(sums.g), 0, np.inf
     for taken in range(most_steps + 1):
         residuals(hand, tree, targets, wanted, pose, sums)
-        cost = sums.parts[TOUCH] + sums.parts[OVERLAP]
+        cost = sums.parts[TOUCH_PART] + sums.parts[OVERLAP_PART]
         stalled = stalled + 1 if cost > (1.0 - STALLED) * least else 0
         least = min(least, cost)
-        settled = sums.parts[OFF] <= good and sums.parts[OVERLAP] <= FREE
-        if settled or stalled >= PATIENCE or taken == most_steps:
+        settled = sums.parts[OFF_PART] <= good and sums.parts[OVERLAP_PART] <= NO_OVERLAP
+        if settled or stalled >= MOST_STALLED or taken == most_steps:
             return
         _fill_step(hand, wanted, pose, sums, step)
         _take(hand, pose, sums.pivot, step)
@@ -436,7 +438,7 @@ def settle(
 
 @loop()
 def lay(
-    hand: HandArrays, tree: SurfaceTree, targets: Targets, pose: Pose, points: Array
+    hand: HandArrays, tree: SurfaceTree, targets: Targets, pose: HandPose, points: Array
 ) -> float:  # fmt: skip
     """Lay the planes that fingertips touch on the surface itself.
 
@@ -453,7 +455,7 @@ def lay(
         finger, tip = targets.fingers[k], pose.tips[k]
         distance = tip_surface(hand, pose.turned, pose.middles, tree, finger, tip, points[k])
         targets.touching[k] = np.nan
-        if distance <= ON_SURFACE:
+        if distance <= NO_DIRECTION:
             off = np.inf
             for j in range(3):
                 targets.origins[k, j] -= BACK * targets.normals[k, j]

@@ -17,7 +17,7 @@ order of fingers around the palm that runs the wrong way leaves a large rest.
 
 The pregrasp keeps the palm where it is and moves fingertips away from the surface, along the
 normals as far as the joints allow. The way in is a straight line of the palm with the fingers open.
-Both are checked by exact distances; the line at steps of `TICK`.
+Both are checked by exact distances; the line at steps of `WAY_TICK`.
 """
 
 import math
@@ -38,74 +38,86 @@ from grasp_core.frames import plane_tangents
 from grasp_core.hands.collisions import surface_tree
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_arrays import (
+    Gaps,
     HandArrays,
-    Pose,
+    HandPose,
     SurfaceTree,
     Targets,
-    Wanted,
+    direction,
     hand_arrays,
 )
+from grasp_core.hands.settings import ReachSettings
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.ties import largest_first
 from grasp_core.values import FINGERS, Grasp
 
-KERNEL = "grasp_core.hands.pose_kernel"
-NARROW = 1e-4
+POSE_KERNEL = "grasp_core.hands.pose_kernel"
+NARROWEST = 1e-4
 """Least inscribed radius of a region that is aimed at; in smaller ones the contact is [m]."""
-SOFT = 2e-3
+SOUGHT_SOFTNESS = 2e-3
 """How far corners of a block below the farthest count while a pose is sought [m]."""
-SHORT = 1e-9  # length below which an edge of a region is left out [m]
-TOUCHING = 1e-5
+SHORT_EDGE = 1e-9  # length below which an edge of a region is left out [m]
+TIP_TOUCHING = 1e-5
 """Largest gap or overlap of a fingertip that counts as touching [m]: a tenth of the overlap that
 simulators and makers of hands allow."""
-MOST_STEPS = 60
+MOST_SEARCH_STEPS = 60
 GOOD_MM, ROUGH_MM, FINE_MM = 0.05, 1.0, 1e-6
 """Distances from touching at which the search for a pose ends, from which fingertips are laid on
 the surface, and at which they lie on a flat one [mm]."""
 MOST_TOUCHES, TOUCH_STEPS = 12, 8
 """Largest number of planes that a fingertip tries on a curved surface, and of steps to each."""
-SETTLED, RESTING_MM = 1e-9, 1e-9
+SETTLED_M, RESTING_MM = 1e-9, 1e-9
 """Change of a distance below which a fingertip rests on a surface [m], and distance from touching
 at which it does [mm]."""
-HARD = 1e-4
+LAID_SOFTNESS = 1e-4
 """How far corners of a block below the farthest still count when fingertips are laid down [m]."""
-ROOM = 0.0015
+SEARCH_ROOM = 0.0015
 """Distance beyond the one asked for that the search keeps from the object [m]."""
 PULL = 0.03
-MARGIN, LEAST_MARGIN = 5e-4, 1e-4
+EDGE_MARGIN, LEAST_EDGE_MARGIN = 5e-4, 1e-4
 """Distances from the edges of regions that are sought, and kept when fingertips are laid down [m].
 """
 POSTURES = 400  # number of postures to choose from
-TRIES = 60_000  # number of random joint angles among which they are looked for
+RANDOM_POSTURES = 60_000  # number of random joint angles among which they are looked for
 INNER = (0.1, 0.85)
 """Part of the joints' ranges in which they are looked for: rather open than closed."""
-APART = 0.002  # least distance between links in a posture [m]
-WIDEST = 0.075  # largest distance of a fingertip from the middle of all [m]
-KEPT = 300  # number of postures with an order of fingers that are laid over the contacts
-LENGTH = 0.02  # difference of two distances between fingertips that counts as one [m]
+POSTURE_CLEARANCE = 0.002  # least distance between links in a posture [m]
+WIDEST_TIPS = 0.075  # largest distance of a fingertip from the middle of all [m]
+KEPT_POSTURES = 300  # number of postures with an order of fingers that are laid over the contacts
+EQUAL_LENGTH = 0.02  # difference of two distances between fingertips that counts as one [m]
 TURN = 0.3  # weight of the angles between ways inwards
 ARM = 0.03  # length of the ways inwards where they are laid over each other [m]
-ROUND = 9
+TIE_DIGITS = 9
 """Digits after the point to which rests, and cosines, are compared: ties are decided by the order.
 """
 
 
 @dataclass(frozen=True, eq=False)
-class Asked:
+class AskedPose:
     """What a pose is sought for."""
 
     hand: Hand
     body: Polyhedron
     grasp: Grasp
     friction: float
-    up: Array  # unit normal of the table, (3,)
-    height: float  # its height along it; minus infinity for none [m]
-    clearance: float
-    """Least distance of everything from what it must not touch [m], but for links whose tips touch
-    the object: they must only not overlap it."""
-    regions: bool  # whether contacts may be anywhere in their regions
-    seed: int
-    most_starts: int  # largest number of starts for each choice of contacts
+    settings: ReachSettings
+
+    @property
+    def clearance(self) -> float:
+        """Return the least distance of everything from what it must not touch [m].
+
+        Links whose tips touch the object must only not overlap it.
+        """
+        return self.settings.clearance_m
+
+    @cached_property
+    def table(self) -> tuple[Array, float]:
+        """Return the table's unit normal, (3,), and its height along it [m]: -inf for none."""
+        down = self.settings.table_down
+        if down is None:
+            return np.array([0.0, 0.0, 1.0]), -np.inf
+        up = -direction(down, "table_down")
+        return up, float((self.body.vertices @ up).min())
 
     @cached_property
     def arrays(self) -> HandArrays:
@@ -117,9 +129,9 @@ class Asked:
         """Return the object's surface."""
         return surface_tree(self.body)
 
-    def pose(self, contacts: int, palm: Array, origin: Array, joints: Array) -> Pose:
+    def pose(self, contacts: int, palm: Array, origin: Array, joints: Array) -> HandPose:
         """Return a pose whose parts are still to be placed."""
-        pose: Pose = compiled(KERNEL).empty_pose(self.arrays, contacts)
+        pose: HandPose = compiled(POSE_KERNEL).empty_pose(self.arrays, contacts)
         pose.palm[:], pose.origin[:], pose.q[:] = palm, origin, joints
         return pose
 
@@ -158,10 +170,10 @@ def proved_closure(points: Array, normals: Array, friction: float) -> ClosureCer
         return None
 
 
-def targets(asked: Asked, used: Indices, *, regions: bool) -> Targets:
+def targets(asked: AskedPose, used: Indices, *, regions: bool) -> Targets:
     """Say where fingertips are to touch, finger k at the k-th of the contacts that are used."""
     normals, own = asked.grasp.normals[used], [asked.grasp.regions[int(k)] for k in used]
-    aimed = [regions and each.kind != "point" and each.inscribed_radius > NARROW for each in own]
+    aimed = [regions and each.kind != "point" and each.inscribed_radius > NARROWEST for each in own]
     edges = [
         _edges(region.polygon, normal) if aim else np.empty((2, 0, 3))
         for aim, region, normal in zip(aimed, own, normals, strict=True)
@@ -170,9 +182,9 @@ def targets(asked: Asked, used: Indices, *, regions: bool) -> Targets:
     return Targets(
         numbers, to_digits(asked.grasp.positions[used]), normals,
         np.array([plane_tangents(*normal) for normal in normals.tolist()]),
-        np.where(aimed, 0.0, 1.0), np.full((len(used), 3), np.nan), SOFT,
+        np.where(aimed, 0.0, 1.0), np.full((len(used), 3), np.nan), SOUGHT_SOFTNESS,
         np.repeat(numbers, [each.shape[1] for each in edges]), points, inward,
-        np.array(asked.up), asked.height,
+        *asked.table,
     )  # fmt: skip
 
 
@@ -180,7 +192,7 @@ def _edges(polygon: Array, normal: Array) -> Array:
     """Return points of the edges and unit vectors from them into the convex polygon, (2, e, 3)."""
     polygon = to_digits(polygon)
     along = np.roll(polygon, -1, axis=0) - polygon
-    kept = np.linalg.norm(along, axis=1) > SHORT
+    kept = np.linalg.norm(along, axis=1) > SHORT_EDGE
     starts, inward = polygon[kept], cross(normal, along[kept])
     sides = np.einsum("ej,ej->e", inward, polygon.mean(axis=0) - starts)
     inward *= np.copysign(1.0 / np.linalg.norm(inward, axis=1), sides)[:, None]
@@ -192,17 +204,17 @@ def postures(hand: Hand, seed: int) -> tuple[Array, Array]:
     """Choose at most `POSTURES` at random: joint angles, (n, j), and tips' middles, (n, f, 3)."""
     arrays, rng = hand_arrays(hand), np.random.default_rng(seed)
     low, high = arrays.ranges.T
-    share = rng.uniform(*INNER, (TRIES, len(low)))
+    share = rng.uniform(*INNER, (RANDOM_POSTURES, len(low)))
     angles = hand.drives.obeyed(low + (high - low) * share)
     kept, tips = np.empty(POSTURES, np.int64), np.empty((POSTURES + 1, len(arrays.tip_radii), 3))
     kernel = compiled("grasp_core.hands.collisions_kernel")
-    count = kernel.free_postures(arrays, angles, APART, WIDEST, kept, tips)
+    count = kernel.free_postures(arrays, angles, POSTURE_CLEARANCE, WIDEST_TIPS, kept, tips)
     return angles[kept[:count]], tips[:count]
 
 
-def starts(asked: Asked, positions: Array, normals: Array) -> Iterator[tuple[Indices, Pose]]:
+def starts(asked: AskedPose, points: Array, normals: Array) -> Iterator[tuple[Indices, HandPose]]:
     """Choose where to start from, best first: the finger for each contact, (k,), and a pose."""
-    (joints, ends), arrays = postures(asked.hand, asked.seed), asked.arrays
+    (joints, ends), arrays = postures(asked.hand, asked.settings.seed), asked.arrays
     if not len(joints):
         return
     orders = np.array(list(permutations(range(len(arrays.tip_radii)), len(normals))))
@@ -210,15 +222,15 @@ def starts(asked: Asked, positions: Array, normals: Array) -> Iterator[tuple[Ind
     inward /= np.maximum(np.linalg.norm(inward, axis=2, keepdims=True), 1e-9)
     i, j = np.triu_indices(len(normals), 1)
     # all tips of a hand are taken to be as thick as the first
-    middles = positions - arrays.tip_radii[0] * normals
+    middles = points - arrays.tip_radii[0] * normals
     apart = np.linalg.norm(middles[i] - middles[j], axis=1)
     angles = np.einsum("pi,pi->p", normals[i], normals[j])
     between = np.linalg.norm(ends[:, :, None] - ends[:, None], axis=3)
     ways = np.einsum("nai,nbi->nab", inward, inward)
     one, other = orders[:, i], orders[:, j]
-    off = ((between[:, one, other] - apart) ** 2).sum(axis=2) / LENGTH**2
+    off = ((between[:, one, other] - apart) ** 2).sum(axis=2) / EQUAL_LENGTH**2
     off += TURN * ((ways[:, one, other] - angles) ** 2).sum(axis=2)
-    likely = np.argsort(off.round(ROUND), axis=None, kind="stable")[:KEPT]
+    likely = np.argsort(off.round(TIE_DIGITS), axis=None, kind="stable")[:KEPT_POSTURES]
     which, order = np.unravel_index(likely, off.shape)
     tips = ends[which[:, None], orders[order]]
     held = tips.mean(axis=1)
@@ -229,10 +241,10 @@ def starts(asked: Asked, positions: Array, normals: Array) -> Iterator[tuple[Ind
     Vt[:, 2] *= np.sign(np.linalg.det(U) * np.linalg.det(Vt))[:, None]
     turns = np.einsum("nji,nkj->nik", Vt, U)  # lay ours best over theirs
     rests = ((np.einsum("nij,nkj->nki", turns, ours) - theirs) ** 2).sum(axis=(1, 2))
-    best = np.argsort((rests / ARM**2).round(ROUND), kind="stable")[: asked.most_starts]
+    best = np.argsort((rests / ARM**2).round(TIE_DIGITS), kind="stable")[: asked.settings.starts]
     places = center - np.einsum("nij,nj->ni", turns, held)
     for n in best:
-        turned, place = _steady(turns[n]), to_digits(places[n], LENGTH)
+        turned, place = _steady(turns[n]), to_digits(places[n], EQUAL_LENGTH)
         yield (
             orders[order[n]].astype(np.int64),
             asked.pose(len(normals), turned, place, joints[which[n]]),
@@ -257,13 +269,13 @@ class FoundPose:
 
     used: Indices  # indices of the grasp's contacts at which fingers stand, (k,)
     aims: Targets  # where they touch, with the finger at each
-    pose: Pose
+    pose: HandPose
     certificate: ClosureCertificate  # with the contacts that are reached
     within: tuple[bool, ...]  # whether each contact is in its region, or as planned
     starts: int = 1  # number of starts that were tried
 
 
-def find_pose(asked: Asked, choices: Sequence[tuple[int, ...]]) -> FoundPose | Counter[str]:
+def find_pose(asked: AskedPose, choices: Sequence[tuple[int, ...]]) -> FoundPose | Counter[str]:
     """Look for a pose from one start after the other; without one, count how starts ended.
 
     They end `away` (fingertips do not touch), at a `limit` (the same, with a joint at one), with an
@@ -272,7 +284,7 @@ def find_pose(asked: Asked, choices: Sequence[tuple[int, ...]]) -> FoundPose | C
     tally: Counter[str] = Counter()
     for chosen in choices:
         used = np.array(chosen, np.int64)
-        aims = targets(asked, used, regions=asked.regions)
+        aims = targets(asked, used, regions=asked.settings.regions)
         for fingers, pose in starts(asked, aims.origins, aims.normals):
             ended = _tried(asked, used, aims._replace(fingers=fingers), pose)
             if not isinstance(ended, str):
@@ -281,13 +293,13 @@ def find_pose(asked: Asked, choices: Sequence[tuple[int, ...]]) -> FoundPose | C
     return tally
 
 
-def _tried(asked: Asked, used: Indices, aims: Targets, pose: Pose) -> FoundPose | str:
+def _tried(asked: AskedPose, used: Indices, aims: Targets, pose: HandPose) -> FoundPose | str:
     """Move the hand from one start; return a pose, or what is in the way."""
-    kernel = compiled(KERNEL)
-    sums, room = kernel.empty_sums(asked.arrays, aims), asked.clearance + ROOM
-    far = Wanted(room, asked.clearance, room, MARGIN, PULL, True, True)
-    kernel.settle(asked.arrays, asked.tree, aims, far, pose, sums, MOST_STEPS, GOOD_MM)
-    near = far._replace(overlaps=False, margin=LEAST_MARGIN, pull=0.0)
+    kernel = compiled(POSE_KERNEL)
+    sums, room = kernel.empty_sums(asked.arrays, aims), asked.clearance + SEARCH_ROOM
+    far = Gaps(room, asked.clearance, room, EDGE_MARGIN, PULL, True, True)
+    kernel.settle(asked.arrays, asked.tree, aims, far, pose, sums, MOST_SEARCH_STEPS, GOOD_MM)
+    near = far._replace(overlaps=False, margin=LEAST_EDGE_MARGIN, pull=0.0)
     rest = None if sums.parts[0] > ROUGH_MM else _laid(asked, aims, near, pose)
     if rest is None:
         low, high = asked.arrays.ranges.T
@@ -299,29 +311,31 @@ def _tried(asked: Asked, used: Indices, aims: Targets, pose: Pose) -> FoundPose 
     certificate = proved_closure(points, laid.normals, asked.friction)
     if certificate is None or not certificate.closed:
         return "open"
-    within = _are_within(aims, certificate.positions, MARGIN)
+    within = _are_within(aims, certificate.positions, EDGE_MARGIN)
     return FoundPose(used, laid, pose, certificate, within)
 
 
-def _laid(asked: Asked, aims: Targets, near: Wanted, pose: Pose) -> tuple[Targets, Array] | None:
+def _laid(
+    asked: AskedPose, aims: Targets, near: Gaps, pose: HandPose
+) -> tuple[Targets, Array] | None:
     """Move a hand that is near until its fingertips rest on the surface: planes and contacts.
 
     Which point of a block touches is only known then, so that its region is asked for again.
     """
-    arrays, kernel = asked.arrays, compiled(KERNEL)
+    arrays, kernel = asked.arrays, compiled(POSE_KERNEL)
     laid = aims._replace(
         origins=np.array(aims.origins), normals=np.array(aims.normals),
-        touching=np.array(aims.touching), soft=HARD,
+        touching=np.array(aims.touching), soft=LAID_SOFTNESS,
     )  # fmt: skip
     sums, balls = kernel.empty_sums(arrays, aims), len(arrays.tip_corners) == len(arrays.tip_radii)
     points, off, before, inside = np.empty((len(laid.fingers), 3)), np.inf, np.inf, True
     for _ in range(MOST_TOUCHES):
         kernel.settle(arrays, asked.tree, laid, near, pose, sums, TOUCH_STEPS, FINE_MM)
         before, off = off, kernel.lay(arrays, asked.tree, laid, pose, points)
-        inside = balls or all(_are_within(aims, points, TOUCHING))
-        if inside and (off <= RESTING_MM or abs(before - off) <= SETTLED):
+        inside = balls or all(_are_within(aims, points, TIP_TOUCHING))
+        if inside and (off <= RESTING_MM or abs(before - off) <= SETTLED_M):
             break
-    return (laid, points) if inside and off <= TOUCHING else None
+    return (laid, points) if inside and off <= TIP_TOUCHING else None
 
 
 def _are_within(aims: Targets, points: Array, slack: float) -> tuple[bool, ...]:
@@ -336,35 +350,35 @@ def _are_within(aims: Targets, points: Array, slack: float) -> tuple[bool, ...]:
     return tuple(within)
 
 
-def blocking(asked: Asked, pose: Pose, fingers: Indices | None = None) -> str:
+def blocking(asked: AskedPose, pose: HandPose, fingers: Indices | None = None) -> str:
     """Return what a placed hand overlaps: `self`, `object`, `table`, or nothing."""
     arrays, clearance = asked.arrays, asked.clearance
     kernel = compiled("grasp_core.hands.collisions_kernel")
     needs = np.full(len(arrays.shape_links), clearance)
     if fingers is not None:
         needs[np.isin(arrays.shape_links, arrays.starts[fingers + 1] - 1)] = 0.0
-        needs[np.isin(arrays.shape_tips, fingers)] = -TOUCHING
-    shapes = arrays, pose.turned, pose.middles
+        needs[np.isin(arrays.shape_tips, fingers)] = -TIP_TOUCHING
+    shapes, (up, height) = (arrays, pose.turned, pose.middles), asked.table
     if kernel.of_itself(*shapes, clearance) < clearance:
         return "self"
-    if asked.height > -np.inf and kernel.of_table(*shapes, asked.up, asked.height) < clearance:
+    if height > -np.inf and kernel.of_table(*shapes, up, height) < clearance:
         return "table"
     return "object" if kernel.of_object(*shapes, asked.tree, needs) < 0.0 else ""
 
 
 GAPS_M = (0.015, 0.01, 0.006, 0.003)
 """Distances of fingertips from the surface that are tried, the largest first [m]."""
-LEAST_GAP = 0.5  # part of such a distance that every fingertip must have
-STEPS = 30
-TICK, LINE = 0.004, 0.06
+LEAST_OPEN_SHARE = 0.5  # part of such a distance that every fingertip must have
+OPENING_STEPS = 30
+WAY_TICK, LINE = 0.004, 0.06
 """Distance of the poses that are checked on the way in, and its length [m]."""
-TILT = 0.4
+WAY_TILT = 0.4
 """Slope at which some ways in lean from the line from the palm to the contacts' middle."""
 LEAST_ALONG = 0.2
 """Least cosine of the angle between a way in and the line from the palm to the contacts' middle."""
 
 
-def opened(asked: Asked, found: FoundPose) -> tuple[Array | None, Array | None]:
+def opened(asked: AskedPose, found: FoundPose) -> tuple[Array | None, Array | None]:
     """Return joint angles with open fingers, and the palm's unit way in; None if not found."""
     planned = targets(asked, found.used, regions=False)._replace(fingers=found.aims.fingers)
     joints = _open_joints(asked, found, planned)
@@ -375,11 +389,10 @@ def opened(asked: Asked, found: FoundPose) -> tuple[Array | None, Array | None]:
     return joints, next(ways, None)
 
 
-def _open_joints(asked: Asked, found: FoundPose, planned: Targets) -> Array | None:
-    """Return joint angles at which fingertips are off the surface and nothing overlaps."""
-    arrays, kernel = asked.arrays, compiled(KERNEL)
+def _open_joints(asked: AskedPose, found: FoundPose, planned: Targets) -> Array | None:
+    arrays, kernel = asked.arrays, compiled(POSE_KERNEL)
     contacts, clear, held = found.certificate, asked.clearance, found.pose
-    wanted = Wanted(clear, clear, clear, 0.0, 0.0, overlaps=True, palm_moves=False)
+    wanted = Gaps(clear, clear, clear, 0.0, 0.0, overlaps=True, palm_moves=False)
     for gap in GAPS_M:
         aims = planned._replace(
             origins=contacts.positions - gap * contacts.normals, normals=np.array(contacts.normals),
@@ -387,16 +400,16 @@ def _open_joints(asked: Asked, found: FoundPose, planned: Targets) -> Array | No
         )  # fmt: skip
         pose = asked.pose(len(found.used), held.palm, held.origin, held.q)
         sums = kernel.empty_sums(arrays, aims)
-        kernel.settle(arrays, asked.tree, aims, wanted, pose, sums, STEPS, 1e3 * 0.1 * gap)
+        kernel.settle(arrays, asked.tree, aims, wanted, pose, sums, OPENING_STEPS, 1e3 * 0.1 * gap)
         kernel.place(arrays, aims, pose)
         away = np.einsum("ki,ki->k", contacts.positions - pose.fronts, contacts.normals)
         open_by = away - arrays.tip_roundings[aims.fingers]
-        if open_by.min() >= LEAST_GAP * gap and not blocking(asked, pose):
+        if open_by.min() >= LEAST_OPEN_SHARE * gap and not blocking(asked, pose):
             return pose.q
     return None
 
 
-def _ways(asked: Asked, found: FoundPose) -> Array:
+def _ways(asked: AskedPose, found: FoundPose) -> Array:
     """Return unit vectors along which the palm may move in, the likeliest first, (n, 3)."""
     middle = found.certificate.positions.mean(axis=0)
     palm = np.array([shape.position for shape in asked.hand.palm] or [np.zeros(3)]).mean(axis=0)
@@ -407,17 +420,16 @@ def _ways(asked: Asked, found: FoundPose) -> Array:
     steps = steps[np.abs(steps).max(axis=1) > 0.0]
     others = (steps / np.linalg.norm(steps, axis=1, keepdims=True)) @ R.T
     along = others @ ahead
-    order = np.argsort(-along.round(ROUND), kind="stable")
-    leaning = ahead + TILT * np.vstack([R.T, -R.T])
+    order = np.argsort(-along.round(TIE_DIGITS), kind="stable")
+    leaning = ahead + WAY_TILT * np.vstack([R.T, -R.T])
     leaning /= np.linalg.norm(leaning, axis=1, keepdims=True)
     return np.vstack([ahead, leaning, others[order[along[order] > LEAST_ALONG]]])
 
 
-def _is_free(asked: Asked, planned: Targets, held: Pose, way: Array) -> bool:
-    """Return whether an open hand is free at all steps of a straight way in."""
-    for back in np.arange(TICK, LINE + 0.5 * TICK, TICK):
+def _is_free(asked: AskedPose, planned: Targets, held: HandPose, way: Array) -> bool:
+    for back in np.arange(WAY_TICK, LINE + 0.5 * WAY_TICK, WAY_TICK):
         pose = asked.pose(len(planned.fingers), held.palm, held.origin - back * way, held.q)
-        compiled(KERNEL).place(asked.arrays, planned, pose)
+        compiled(POSE_KERNEL).place(asked.arrays, planned, pose)
         if blocking(asked, pose):
             return False
     return True

@@ -13,13 +13,12 @@ The stance of a pose is what mechanics and scenes need of it, with balls for all
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike
 from pydantic import Field, computed_field
 
-from grasp_core.arrays import Array, Indices, Shape, UnitVector, frozen, frozen_indices
+from grasp_core.arrays import Array, Indices, Shape, UnitVector, frozen_indices
 from grasp_core.by_value import summary
 from grasp_core.closure.closure_certificate import ClosureCertificate
 from grasp_core.declared import Declared, declared
@@ -28,8 +27,9 @@ from grasp_core.figures import Shown
 from grasp_core.frames import POSE_SIZE
 from grasp_core.hands.hand import Fingertip, Hand
 from grasp_core.hands.hand_arrays import places
-from grasp_core.hands.pose_search import Asked, contact_choices, find_pose, opened
-from grasp_core.kinds import Friction, HandClearance, Number, Seed, Starts, instance, value_of
+from grasp_core.hands.pose_search import AskedPose, contact_choices, find_pose, opened
+from grasp_core.hands.settings import ReachSettings
+from grasp_core.kinds import Friction, HandClearance, Number, instance, value_of
 from grasp_core.messages import shown
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
@@ -148,17 +148,13 @@ class HandReach(Declared):
         return summary("HandReach", self.hand, self.grasp, told, starts=self.starts)
 
 
-def reach_with(  # noqa: PLR0913 - one keyword for each thing that may be asked
+def reach_with(
     hand: Hand,
     body: Polyhedron,
     grasp: Grasp,
     friction: float,
-    *,
-    seed: int = 0,
-    regions: bool = True,
-    table_down: ArrayLike | None = None,
-    clearance_m: float = 5e-4,
-    starts: int = 100,
+    settings: ReachSettings | None = None,
+    **given: Any,
 ) -> HandReach:
     """Look for a pose in which a hand stands in a grasp.
 
@@ -168,13 +164,8 @@ def reach_with(  # noqa: PLR0913 - one keyword for each thing that may be asked
         body: The object.
         grasp: The grasp.
         friction: Coulomb coefficient at every contact.
-        seed: Seed of the postures from which the search starts.
-        regions: Whether contacts may be anywhere in the grasp's regions, where it has some, or must
-            be the planned ones.
-        table_down: Downward direction in the object's frame, (3,): the object lies on a table
-            across it, and the hand stays above the table. None for no table.
-        clearance_m: Least distance between all that must not touch [m].
-        starts: Largest number of starts, for each choice of contacts.
+        settings: What is asked of the pose; the usual settings if None.
+        given: Settings by their names, in place of those of `settings`.
 
     Returns:
         A pose that is checked, or what was in the way.
@@ -185,14 +176,11 @@ def reach_with(  # noqa: PLR0913 - one keyword for each thing that may be asked
     instance(hand, Hand, "hand", "load_hand makes one")
     check_body(body)
     instance(grasp, Grasp, "grasp", "plan finds some")
-    up, height = _table(body, table_down)
-    value_of(bool, regions, "regions")
-    asked = Asked(
-        hand, body, grasp, value_of(Friction, friction, "friction"), up, height,
-        value_of(HandClearance, clearance_m, "clearance_m"), regions,
-        value_of(Seed, seed, "seed"), value_of(Starts, starts, "starts"),
-    )  # fmt: skip
-    closed, refuted, undecided = contact_choices(grasp, asked.friction, len(hand.fingers))
+    value_of(Friction, friction, "friction")
+    usual = ReachSettings() if settings is None else instance(settings, ReachSettings, "settings")
+    asked = AskedPose(hand, body, grasp, friction, replace(usual, **given))
+    clearance_m = asked.settings.clearance_m
+    closed, refuted, undecided = contact_choices(grasp, friction, len(hand.fingers))
     if not closed:
         return _unclosed(asked, refuted, undecided)
     found = find_pose(asked, closed)
@@ -208,23 +196,9 @@ def reach_with(  # noqa: PLR0913 - one keyword for each thing that may be asked
     )  # fmt: skip
 
 
-def _table(body: Polyhedron, down: ArrayLike | None) -> tuple[Array, float]:
-    if down is None:
-        return np.array([0.0, 0.0, 1.0]), -np.inf
-    up = -direction(down, "table_down")
-    return up, float((body.vertices @ up).min())
-
-
-def direction(down: ArrayLike, name: str) -> Array:
-    """Scale a direction to unit length, (3,)."""
-    way = frozen(down, (3,), name)
-    length = float(np.linalg.norm(way))
-    if length == 0.0:
-        raise InputError(f"{name} must be a direction, got a vector of length zero")
-    return way / length
-
-
-def _unclosed(asked: Asked, refuted: tuple[ClosureCertificate, ...], undecided: int) -> HandReach:
+def _unclosed(
+    asked: AskedPose, refuted: tuple[ClosureCertificate, ...], undecided: int
+) -> HandReach:
     count, name = len(asked.hand.fingers), asked.hand.name
     fewer = f"{name} has {count} fingers, and no {count} of the grasp's {FINGERS} contacts alone"
     at = f"at friction {asked.friction:g}"
@@ -235,7 +209,7 @@ def _unclosed(asked: Asked, refuted: tuple[ClosureCertificate, ...], undecided: 
         said = f"{fewer} are proved to be in force closure {at}; {undecided} choices of "
         said += "contacts are undecided"
     return HandReach(
-        name, asked.grasp.id, reason, said, 0, asked.clearance, open_choices=refuted
+        name, asked.grasp.id, reason, said, 0, asked.settings.clearance_m, open_choices=refuted
     )  # fmt: skip
 
 
@@ -329,10 +303,9 @@ def with_balls(
     if not touching:
         return hand
     found, made = places(hand, joints, palm_pose), list(hand.fingers)
-    ends = np.cumsum([len(finger.links) for finger in hand.fingers]) - 1
     for f, contact in touching.items():
-        radius, R = made[f].tip.radius, found.link_rotations[0, ends[f]]
+        radius, end = made[f].tip.radius, hand.chains[f][-1]
         middle = contact.position - radius * contact.normal
-        center = R.T @ (middle - found.link_positions[0, ends[f]])
+        center = found.link_rotations[0, end].T @ (middle - found.link_positions[0, end])
         made[f] = replace(made[f], tip=Fingertip(center, radius))
     return replace(hand, fingers=tuple(made))

@@ -22,7 +22,7 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.errors import NoForcesError
-from grasp_core.execution.best_squeeze import GAP, searched
+from grasp_core.execution.best_squeeze import SQUEEZE_GAP, searched
 from grasp_core.execution.grips import STIFFNESS_N_PER_M, Grip, springs
 from grasp_core.execution.loads import any_direction
 from grasp_core.families.placing import CONSTRUCTIONS, chosen_shapes
@@ -417,7 +417,7 @@ def _measure(search: PlanSearch) -> tuple[Callable[[Certified], float], float]:
         return -carried(body, points, found.normals, request.friction, request.finger)
 
     # the best squeeze is searched to a gap, so equal grasps may come out as far apart
-    return lightness, 2.0 * GAP
+    return lightness, 2.0 * SQUEEZE_GAP
 
 
 def carried(

@@ -5,21 +5,37 @@ links, and the others get copies without shapes and masses, whose joints follow 
 finger, so that all move as one link.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import combinations
 from pathlib import Path
 
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.errors import InputError, about
 from grasp_core.hands.collisions import overlapping_pairs
-from grasp_core.hands.hand import PALM, Coupling, Hand, HandFinger, Joint, Link, LinkShape
+from grasp_core.hands.hand import (
+    FEWEST_FINGERS,
+    MOST_FINGERS,
+    PALM_NAME,
+    Coupling,
+    Hand,
+    HandFinger,
+    Joint,
+    Link,
+    LinkShape,
+)
 from grasp_core.hands.hand_arrays import rotation_about
-from scenes.hand_files.fingers import Chains, chains, followers, joint_name, tip_of
+from grasp_core.kinds import path_of, several, value_of
+from grasp_core.messages import shown
+from grasp_core.names import HANDS
+from scenes.hand_files.fingers import FingerChains, finger_chains, followers, joint_name, tip_of
 from scenes.hand_files.model import NO_MASS_KG, HandModel, compiled_hand
 from scenes.hand_files.model_text import model_text, note
 
+HAND_ENDINGS = (".xml", ".mjcf", ".urdf")
 AS_BOXES = "shapes other than boxes, capsules and spheres are taken as their boxes"
 CLOSE_BY = 2
 """Number of joints between links that may be built into each other, at most."""
@@ -27,11 +43,36 @@ FULL_TURN = np.pi
 """Largest angle of a joint for which the file states no range [rad]."""
 
 
-def hand_from_file(path: Path, fingertips: tuple[str, ...]) -> Hand:
-    """Make the hand that a file describes."""
+def hand_from_file(path: str | Path, fingertips: Iterable[str]) -> Hand:
+    """Make the hand that a file describes.
+
+    Args:
+        path: An MJCF file (.xml, .mjcf) or a URDF file (.urdf).
+        fingertips: Name of a site, geom or body for each of three to five fingertips.
+
+    Raises:
+        InputError: The file is refused; the message says what to do.
+    """
+    names = several(fingertips, partial(value_of, str, name="fingertips"), "fingertips", "names")
+    place = path_of(path, "path")
+    if place.suffix.lower() not in HAND_ENDINGS:
+        raise InputError(
+            f"path of a hand must end with {', '.join(HAND_ENDINGS)}, got {shown(str(path))}; "
+            f"built-in hands are {', '.join(HANDS)}"
+        )
+    if not FEWEST_FINGERS <= len(names) <= MOST_FINGERS:
+        raise InputError(
+            f"{place}: name {FEWEST_FINGERS} to {MOST_FINGERS} fingertips (sites, geoms or bodies "
+            f"of the file), got {len(names)}"
+        )
+    with about(place):
+        return _read(place, tuple(names))
+
+
+def _read(path: Path, fingertips: tuple[str, ...]) -> Hand:
     read = model_text(path)
     model = compiled_hand(read)
-    found = chains(model, fingertips)
+    found = finger_chains(model, fingertips)
     tips = [
         tip_of(model, tip, found.frames[chain[-1]])
         for tip, chain in zip(found.tips, found.joints, strict=True)
@@ -75,14 +116,14 @@ def _close_by(hand: Hand, originals: dict[str, str]) -> set[tuple[str, str]]:
     """Return names of links at most two joints apart in a finger, or from the palm."""
     pairs = set[tuple[str, str]]()
     for finger in hand.fingers:
-        chain = [PALM, *(originals.get(link.name, link.name) for link in finger.links)]
+        chain = [PALM_NAME, *(originals.get(link.name, link.name) for link in finger.links)]
         for apart in range(1, CLOSE_BY + 1):
             pairs |= set(map(_named_pair, chain, chain[apart:]))
     return pairs
 
 
 def _shapes(
-    model: HandModel, found: Chains, covers: dict[int | None, LinkShape | None]
+    model: HandModel, found: FingerChains, covers: dict[int | None, LinkShape | None]
 ) -> dict[int, list[LinkShape]]:
     """Collect the shapes that collide, by the joint that moves them, in the links' frames."""
     shapes: dict[int, list[LinkShape]] = {}
@@ -123,8 +164,8 @@ def _shape(model: HandModel, g: int) -> LinkShape:
 
 
 def _links(
-    model: HandModel, found: Chains, shapes: dict[int, list[LinkShape]], chain: tuple[int, ...],
-    ranges: Array,
+    model: HandModel, found: FingerChains, shapes: dict[int, list[LinkShape]],
+    chain: tuple[int, ...], ranges: Array,
 ) -> tuple[Link, ...]:  # fmt: skip
     links, before = list[Link](), -1
     for joint in chain:
@@ -142,11 +183,11 @@ def _links(
 def _link_name(model: HandModel, joint: int) -> str:
     """Name a link: like its body, or like its joint where the body has several or no name."""
     if joint < 0:
-        return PALM
+        return PALM_NAME
     body = int(model.raw.jnt_bodyid[joint])
     shared = int((model.raw.jnt_bodyid == body).sum()) > 1
     name = model.joint_names[joint] if shared else model.body_names[body]
-    return name if name and name != PALM else f"link{joint}"
+    return name if name and name != PALM_NAME else f"link{joint}"
 
 
 def _joint(model: HandModel, joint: int, position: Array, rotation: Array, ends: Array) -> Joint:
@@ -162,7 +203,7 @@ def _joint(model: HandModel, joint: int, position: Array, rotation: Array, ends:
     )  # fmt: skip
 
 
-def _mass(model: HandModel, found: Chains, joint: int) -> tuple[float, Array]:
+def _mass(model: HandModel, found: FingerChains, joint: int) -> tuple[float, Array]:
     """Sum the masses of the bodies that a joint moves, and find their middle in its frame."""
     bodies = [b for b, owner in enumerate(found.owners) if owner == joint]
     masses = model.raw.body_mass[bodies]
@@ -177,7 +218,7 @@ def _mass(model: HandModel, found: Chains, joint: int) -> tuple[float, Array]:
     return total, turned.T @ (masses @ places / total - origin)
 
 
-def _excluded(model: HandModel, found: Chains) -> set[tuple[str, str]]:
+def _excluded(model: HandModel, found: FingerChains) -> set[tuple[str, str]]:
     """Return the names of links that the file lets overlap."""
     pairs = [
         (found.owners[int(both) >> 16], found.owners[int(both) & 0xFFFF])
@@ -189,7 +230,7 @@ def _excluded(model: HandModel, found: Chains) -> set[tuple[str, str]]:
     return {_named_pair(_link_name(model, one), _link_name(model, other)) for one, other in kept}
 
 
-def _may_meet(model: HandModel, found: Chains, one: int, other: int) -> bool:
+def _may_meet(model: HandModel, found: FingerChains, one: int, other: int) -> bool:
     bits = [
         model.geom_bits[[found.owners[b] == joint for b in model.raw.geom_bodyid.tolist()]]
         for joint in (one, other)

@@ -27,15 +27,15 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.errors import InputError
 from grasp_core.hands.collisions import beyond_hull
-from grasp_core.hands.hand import SAME, Coupling, Fingertip, LinkShape
+from grasp_core.hands.hand import FILE_DIGITS, Coupling, Fingertip, LinkShape
 from grasp_core.messages import shown
 from scenes.hand_files.model import HandModel, JointRule, mesh_points
 from scenes.hand_files.model_text import listed, note
 
 WORLD = 0
 ACROSS = {0: (1, 2), 1: (0, 2), 2: (0, 1)}
-SIGNS = np.array(list(product((-1.0, 1.0), repeat=3)))
-ROUNDING = 1e-4
+CORNER_SIGNS = np.array(list(product((-1.0, 1.0), repeat=3)))
+LEAST_BLOCK_ROUNDING = 1e-4
 """Least rounding of a block [m]."""
 MOST_WAYS = 180
 """Number of directions in which the corners of a mesh are taken that has more of them."""
@@ -56,7 +56,7 @@ class Tip:
 
 
 @dataclass(frozen=True, slots=True)
-class Chains:
+class FingerChains:
     """Joints of fingers, and to which link each body is fixed."""
 
     palm: int  # the palm's body
@@ -69,7 +69,7 @@ class Chains:
     """Frame of each joint's link, with the axes of its body; -1 is the palm's."""
 
 
-def chains(model: HandModel, fingertips: tuple[str, ...]) -> Chains:
+def finger_chains(model: HandModel, fingertips: tuple[str, ...]) -> FingerChains:
     """Find the palm and the fingers."""
     tips = tuple(_tip(model, each) for each in fingertips)
     paths = [path_of_body(model, tip.body) for tip in tips]
@@ -101,7 +101,7 @@ def chains(model: HandModel, fingertips: tuple[str, ...]) -> Chains:
         body = int(model.raw.jnt_bodyid[joint])
         R = model.rotations[body]
         frames[joint] = R, model.positions[body] + R @ model.raw.jnt_pos[joint]
-    return Chains(palm, tips, joints, _owners(model, palm, set(frames)), frames)
+    return FingerChains(palm, tips, joints, _owners(model, palm, set(frames)), frames)
 
 
 def _tip(model: HandModel, name: str) -> Tip:
@@ -210,7 +210,8 @@ def tip_of(model: HandModel, tip: Tip, frame: Frame) -> tuple[Fingertip, LinkSha
         return ball(center, radius), None
     corners, rounding = _corners(model, geom)
     low, high = corners.min(axis=0) - rounding, corners.max(axis=0) + rounding
-    cover = LinkShape(place + turned @ (0.5 * (low + high)), turned, 0.5 * (high - low) + SAME, 0.0)
+    covered = 0.5 * (high - low) + FILE_DIGITS
+    cover = LinkShape(place + turned @ (0.5 * (low + high)), turned, covered, 0.0)
     return ball(center, radius, place + corners @ turned.T), cover
 
 
@@ -218,18 +219,18 @@ def _corners(model: HandModel, geom: int) -> tuple[Array, float]:
     """Return corners in a geom's frame, (m, 3), whose hull, less a rounding, holds the geom."""
     box, points = model.raw.geom_aabb[geom], mesh_points(model, geom)
     if len(points) == 0:
-        return box[:3] + SIGNS * box[3:], ROUNDING
+        return box[:3] + CORNER_SIGNS * box[3:], LEAST_BLOCK_ROUNDING
     spatial: Any = importlib.import_module("scipy.spatial")
     points = points[spatial.ConvexHull(points, qhull_options="QJ Pp").vertices]
     if len(points) <= MOST_WAYS:
-        return points, ROUNDING
+        return points, LEAST_BLOCK_ROUNDING
     ways = np.random.default_rng(0).normal(size=(MOST_WAYS, 3))
     kept = points[np.unique(np.argmax(points @ ways.T, axis=0))]
-    return kept, ROUNDING + max(beyond_hull(kept, points))
+    return kept, LEAST_BLOCK_ROUNDING + max(beyond_hull(kept, points))
 
 
 def followers(
-    model: HandModel, found: Chains
+    model: HandModel, found: FingerChains
 ) -> tuple[tuple[Coupling, ...], Array, tuple[str, ...]]:
     """Find which joints follow others: couplings on the way to fingertips, ranges, and notes.
 

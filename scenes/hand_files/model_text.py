@@ -29,25 +29,23 @@ MOST_PIXELS = 4096
 COUNTED, COUNTS = ("texture", "hfield"), ("width", "height", "nrow", "ncol")
 FOLDERS = {"meshdir", "texturedir", "assetdir", "strippath"}
 """Attributes that say where files are."""
-NAMED = ("mesh", "texture", "hfield")
+NAMED_BY_FILES = ("mesh", "texture", "hfield")
 """Elements that are called like their files where they have no name."""
 PACKAGE = re.compile(r"(?:package|model)://([^/]*)/+")
 """What begins the names of files in URDF, with the name of a package."""
 MESHES = (".stl", ".obj", ".msh")
-"""Files that MuJoCo reads as meshes."""
-BESIDE = (*MESHES, ".png", ".xml", ".mjcf")
+BESIDE_ENDINGS = (*MESHES, ".png", ".xml", ".mjcf")
 """Files that may lie in folders beside the model's."""
-ABOVE = 4
+PARENTS_TRIED = 4
 """Number of folders above the model's that may be the package's."""
-MANIFEST = "package.xml"
+PACKAGE_FILE = "package.xml"
 """File in the folder of a ROS package that says how it is called."""
-OTHERS = ("gazebo", "transmission", "ros2_control")
+IGNORED_ELEMENTS = ("gazebo", "transmission", "ros2_control")
 """Elements of URDF that are about other things than the hand's shape, and may hold anything."""
-TURNING = {"revolute", "continuous", "prismatic"}
+MOBILE = {"revolute", "continuous", "prismatic"}
 """Kinds of URDF joints that move by one number."""
-PLAIN = re.compile(r"[\w.-]+", re.ASCII)
-MOST_NAMED = 8
-"""Number of links that a note names."""
+PLAIN_NAME = re.compile(r"[\w.-]+", re.ASCII)
+MOST_LISTED = 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,12 +66,12 @@ def model_text(path: Path) -> ModelText:
     if root.tag == "mujoco":
         with about("<include>"):
             folders = _with_includes(root, path, LARGEST_TEXT - len(raw), etree)
-    for other in [each for each in root if each.tag in OTHERS and root.tag == "robot"]:
+    for other in [each for each in root if each.tag in IGNORED_ELEMENTS and root.tag == "robot"]:
         root.remove(other)
     kinds = {joint.get("name"): joint.get("type") for joint in root.findall("joint")}
     for joint in root.findall("joint"):  # MuJoCo would take those that follow a fixed one as free
         mimic = joint.find("mimic")
-        if mimic is not None and not {kinds.get(mimic.get("joint")), joint.get("type")} <= TURNING:
+        if mimic is not None and not {kinds.get(mimic.get("joint")), joint.get("type")} <= MOBILE:
             raise InputError(
                 f"joint {joint.get('name')} must follow a joint that moves, got <mimic> "
                 f"of {mimic.get('joint')}; name another joint there, or remove it"
@@ -95,7 +93,6 @@ def model_text(path: Path) -> ModelText:
 
 
 def _parsed(raw: bytes, etree: Any) -> Any:
-    """Parse a text to its root element."""
     if b"<!DOCTYPE" in raw or b"<!ENTITY" in raw:
         raise InputError("a hand's file must not declare entities; remove <!DOCTYPE ...>")
     try:
@@ -163,8 +160,8 @@ def note(text: str, names: list[str]) -> tuple[str, ...]:
 
 def listed(names: list[str]) -> str:
     """List names for a note, the first of many."""
-    more = len(names) - MOST_NAMED
-    return ", ".join(names[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
+    more = len(names) - MOST_LISTED
+    return ", ".join(names[:MOST_LISTED]) + (f" and {more} more" if more > 0 else "")
 
 
 def _check_element(element: Any) -> None:
@@ -198,13 +195,13 @@ def _with_files(
                 left -= len(content)
                 # in the compiler's messages it is called as it is, if that name is plain and free
                 free = found.stem.lower() not in {Path(name).stem.lower() for name in files}
-                plain = PLAIN.fullmatch(found.name) is not None
+                plain = PLAIN_NAME.fullmatch(found.name) is not None
                 own = f"file{len(files)}{found.suffix.lower()}"
                 names[given] = found.name if free and plain else own
                 files[names[given]] = content
             if len(names) > MOST_FILES:
                 raise InputError(f"names more than {MOST_FILES} files")
-            if element.tag in NAMED and root.tag == "mujoco":  # unnamed ones are called so
+            if element.tag in NAMED_BY_FILES and root.tag == "mujoco":  # unnamed ones are called so
                 element.attrib.setdefault("name", Path(given).stem)
             element.attrib[key] = names[given]
     return etree.tostring(root, encoding="unicode"), files
@@ -249,7 +246,7 @@ def _found(given: str, places: list[Path]) -> Path:
     said = f", and not in a package {package[1]} around it" if package else ""
     raise InputError(
         f"names the file {given[:80]!r}, which is not in the folder of the model nor in one beside "
-        f"it{said}; put it there, or a {MANIFEST} into the folder that holds all files of the hand"
+        f"it{said}; put it there, or a {PACKAGE_FILE} into the folder of all files of the hand"
     )
 
 
@@ -263,13 +260,13 @@ def _is_near(whole: Path, home: Path, around: Path | None) -> bool:
         return False
     folder, *inner = whole.relative_to(above).parts
     hidden = any(part.startswith(".") for part in (folder, *inner))
-    return bool(inner) and not hidden and whole.suffix.lower() in BESIDE
+    return bool(inner) and not hidden and whole.suffix.lower() in BESIDE_ENDINGS
 
 
 def _package_around(home: Path) -> Path | None:
     """Return the nearest folder with a manifest that a model is in."""
-    around = (home, *home.parents[:ABOVE])
-    return next((above for above in around if (above / MANIFEST).is_file()), None)
+    around = (home, *home.parents[:PARENTS_TRIED])
+    return next((above for above in around if (above / PACKAGE_FILE).is_file()), None)
 
 
 def _roots(home: Path, package: str) -> list[Path]:
@@ -278,10 +275,10 @@ def _roots(home: Path, package: str) -> list[Path]:
     Folders beside must be called like the package and have a manifest that says so; for those in
     which the model is, one of both is enough.
     """
-    if not PLAIN.fullmatch(package) or package.startswith("."):
+    if not PLAIN_NAME.fullmatch(package) or package.startswith("."):
         return []
     found = list[Path]()
-    for above in (home, *home.parents[:ABOVE]):
+    for above in (home, *home.parents[:PARENTS_TRIED]):
         if above.name == package or _is_called(above, package):
             found.append(above)
         if _is_called(above / package, package):
@@ -291,7 +288,7 @@ def _roots(home: Path, package: str) -> list[Path]:
 
 def _is_called(folder: Path, package: str) -> bool:
     try:
-        with (folder / MANIFEST).open("rb") as file:
+        with (folder / PACKAGE_FILE).open("rb") as file:
             said = re.search(rb"<name>\s*([\w.-]+)\s*</name>", file.read(LARGEST_MANIFEST))
     except OSError:
         return False

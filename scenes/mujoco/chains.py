@@ -37,9 +37,14 @@ import numpy as np
 from grasp_core.arrays import Array, to_digits
 from grasp_core.by_value import ByValue
 from grasp_core.declared import Declared, declared
-from grasp_core.hands.hand import PALM, Hand, HandFinger, Link, LinkShape
-from grasp_core.hands.hand_arrays import HandPlaces, jacobian, places, rotation_about, tip_jacobians
-from grasp_core.hands.hand_motors import chains
+from grasp_core.hands.hand import PALM_NAME, Hand, HandFinger, Link, LinkShape
+from grasp_core.hands.hand_arrays import (
+    HandPlaces,
+    jacobian,
+    places,
+    rotation_about,
+    tip_jacobians,
+)
 from grasp_core.hands.reach import Stance
 from grasp_core.quality.motors import Motors
 from scenes.mujoco.mjcf_text import (
@@ -75,7 +80,7 @@ REFINED = 3
 def hand_inertials(hand: Hand) -> dict[str, dict[str, object]]:
     """Return the MJCF inertial of the palm and of each link, by name."""
     own = {link.name: _inertial(link.shapes, link) for link in hand.links}
-    return {PALM: _inertial(hand.palm, None), **own}
+    return {PALM_NAME: _inertial(hand.palm, None), **own}
 
 
 def _inertial(shapes: Sequence[LinkShape], link: Link | None) -> dict[str, object]:
@@ -159,12 +164,12 @@ class HandChains(ByValue):
         """Add the hand to a body, with a servo for each joint (see `Slides.add_to`)."""
         hung = parent if self.weld is None else self.weld.add_to(parts, parent)
         pose = to_digits(self.palm_pose[:3, 3]), self.palm_pose[:3, :3]
-        palm = add_element(hung, "body", {"name": PALM, **placed(*pose)})
-        if PALM in self.inertials:
-            add_element(palm, "inertial", self.inertials[PALM])
+        palm = add_element(hung, "body", {"name": PALM_NAME, **placed(*pose)})
+        if PALM_NAME in self.inertials:
+            add_element(palm, "inertial", self.inertials[PALM_NAME])
         contact = {} if self.rubbing is None else {"friction": self.rubbing, **contact}
         for place, shape in enumerate(self.hand.palm):
-            _shape(palm, f"{PALM}_{place}", shape, self.touches, contact)
+            _shape(palm, f"{PALM_NAME}_{place}", shape, self.touches, contact)
         tips = dict(zip(self.used_fingers, touching, strict=True))
         angles = iter(self.angles.tolist())
         for number, finger in enumerate(self.hand.fingers):
@@ -293,7 +298,7 @@ class StandingHand(HandChains):
         """
         used = list(self.used_fingers)
         found, rest = self._places(joints), self._places(np.zeros((1, len(self.angles))))
-        tips, last = found.tips[:, used], [chains(self.hand)[finger][-1] for finger in used]
+        tips, last = found.tips[:, used], [self.hand.chains[finger][-1] for finger in used]
         normals = np.einsum("nij,kj->nki", turned, self.normals)
         points = tips + self.tip_radii[:, None] * normals
         forces = np.stack(
@@ -310,7 +315,7 @@ class StandingHand(HandChains):
 
     def _force(self, found: HandPlaces, points: Array, loads: Array, finger: int) -> Array:
         """Return the contact force of a finger whose torques are known, (n, 3) [N]."""
-        own = chains(self.hand)[finger]
+        own = self.hand.chains[finger]
         turns: Array = jacobian(self.hand, found, own[-1], points)[:, :, own]
         square: Array = turns @ turns.transpose(0, 2, 1)
         known = np.isfinite(square).all(axis=(1, 2))
@@ -357,6 +362,6 @@ def _overlapping(hand: Hand) -> list[tuple[str, str]]:
     """Return neighbours of a chain, which overlap, and what the hand lets overlap."""
     pairs = {(min(pair), max(pair)) for pair in hand.ignored_pairs}
     for finger in hand.fingers:
-        chain = [PALM, *(link.name for link in finger.links)]
+        chain = [PALM_NAME, *(link.name for link in finger.links)]
         pairs |= {(min(pair), max(pair)) for pair in pairwise(chain)}
     return sorted(pairs)

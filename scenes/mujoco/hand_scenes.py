@@ -40,8 +40,9 @@ from grasp_core.errors import InputError
 from grasp_core.execution.grips import Grip
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.hands.hand import Hand
+from grasp_core.hands.hand_arrays import direction
 from grasp_core.hands.hand_motors import HandGrip, hand_motors
-from grasp_core.hands.reach import HandReach, direction, stance_of, uncoupled
+from grasp_core.hands.reach import HandReach, stance_of, uncoupled
 from grasp_core.kinds import instance
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
@@ -53,11 +54,9 @@ from scenes.mujoco.mjcf_text import FINGERTIP_BIT
 from scenes.mujoco_options import PhysicsSettings
 from scenes.settings import FingerSettings, HeldSettings
 
-TOUCH = 3e-6
+HAND_TOUCH = 3e-6
 """Depth of fingertips in their faces at the start, in grasp sizes: more than numbers of nine
 digits leave open."""
-SIMULATION = "a simulation of the hand"
-EXECUTION = "an execution with the hand"
 IMPEDANCE = 0.999
 """Impedance of contacts. Links are light along some directions, so contacts give way by more than
 under fingertips on slides, and stiff chains of joints lose force by it: with 0.99, up to half a
@@ -76,12 +75,12 @@ def hand_layout(
 ) -> Layout:  # fmt: skip
     """Place an object and a hand, whose joints are turned until fingertips are on faces."""
     check_body(body)
-    stance = stance_of(uncoupled(hand, SIMULATION), reach)
+    stance = stance_of(uncoupled(hand, "a simulation of the hand"), reach)
     motors = hand_motors(hand, reach, down=down)
     squeeze = squeezing(motors, stance.forces)
     push, radii = float(np.abs(squeeze).max()), stance.tip_radii
     tips = FingerSettings(
-        max_normal_force_n=push, fingertip_radius_m=float(radii.max()), indentation=TOUCH
+        max_normal_force_n=push, fingertip_radius_m=float(radii.max()), indentation=HAND_TOUCH
     )
     base = arrange(body, stance.contacts, friction, tips)
     drive, normals, lever = base.drive, base.frames[:, :, 0], mean_lever(motors)
@@ -185,7 +184,8 @@ def strong_motors(hand: Hand, reach: HandReach) -> Motors:
     """Return the motors of a pose, which carry the links in any orientation if they weigh."""
     weighs = all(link.mass_kg is not None and link.center_of_mass is not None
                  for link in hand.links)  # fmt: skip
-    return hand_motors(uncoupled(hand, EXECUTION), reach, any_orientation=weighs)
+    own = uncoupled(hand, "an execution with the hand")
+    return hand_motors(own, reach, any_orientation=weighs)
 
 
 def held_hand_scene(

@@ -48,15 +48,14 @@ TRUE_MASS = (
 )
 SPRINGS = ("a", "b", "c")
 """Endings of the names of a fingertip's three slides."""
-FEWEST_STEPS, MOST_STEPS = 4, 128
-"""Least and largest number of steps in a sample."""
+FEWEST_SAMPLE_STEPS, MOST_SAMPLE_STEPS = 4, 128
 STEP_RAD = 0.2
 """Largest angle by which the held object rings in a step: frequencies are then off by a fifth of a
 percent."""
 STEP_TIP = 0.8
 """Largest product of a step and a loose fingertip's rate: above two, it would never come to rest,
 and contacts that slide slide farther the larger it is."""
-ROUNDING = 1e-6
+STEP_ROUNDING = 1e-6
 """Part of a step that rounding may add to the number that is needed."""
 CONTACT_STEPS = 2.0
 """Time constant of contacts, in steps; the simulator takes no less. With twice as much, contacts
@@ -240,8 +239,8 @@ def held_physics(layout: HeldLayout) -> PhysicsSettings:
     """
     x, y, z = layout.gravity.tolist()
     rate = max(layout.fastest_ring / STEP_RAD, layout.fastest_tip / STEP_TIP)
-    steps = math.ceil(SAMPLE_S * rate - ROUNDING)
-    steps = min(max(steps, FEWEST_STEPS), MOST_STEPS)
+    steps = math.ceil(SAMPLE_S * rate - STEP_ROUNDING)
+    steps = min(max(steps, FEWEST_SAMPLE_STEPS), MOST_SAMPLE_STEPS)
     step = SAMPLE_S / steps
     settling = CONTACT_STEPS * step
     moved = 1.0 / (1.0 / layout.tip_mass_kg + 3.0 / layout.object_kg)

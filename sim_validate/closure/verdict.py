@@ -80,12 +80,29 @@ class HoldsWrenches(Declared):
 
     __slots__ = ()
     wrenches: tuple[WrenchVerdict, ...]
+    controls: tuple[Any, ...]
+    """How each negative control ended: `let_go` says whether it let go of the object."""
     agenda: Agenda
 
     @property
     def failures(self) -> tuple[WrenchVerdict, ...]:
         """The wrenches that were not held, in order."""
         return tuple(trial for trial in self.wrenches if trial.hold.outcome is not Outcome.HELD)
+
+    @property
+    def mismatches(self) -> tuple[str, ...]:
+        """Where simulation contradicts the analysis, one sentence each."""
+        return tuple(self._contradictions())
+
+    @property
+    def controls_let_go(self) -> Annotated[bool, Shown("controls let go", compared=None)]:
+        """Whether every negative control let go of the object, as it must."""
+        return all(control.let_go for control in self.controls)
+
+    @property
+    def good(self) -> bool:
+        """Whether all wrenches held, negative controls let go, and nothing was contradicted."""
+        return not self.failures and self.controls_let_go and not self.mismatches
 
     @property
     def _weakest(self) -> WrenchVerdict:
@@ -305,11 +322,7 @@ class Verdict(HoldsWrenches, InNotebooks):
         """Names of the wrenches that were not held, in order."""
         return tuple(trial.name for trial in self.failures)
 
-    @computed_field
-    @property
-    def controls_let_go(self) -> Annotated[bool, Shown("controls let go", compared=None)]:
-        """Whether every negative control let go of the object, as it must."""
-        return not self.controls_held
+    controls_let_go = computed_field(HoldsWrenches.controls_let_go)  # type: ignore[override]
 
     @figure
     def controls_held(self) -> Annotated[tuple[str, ...], CONTROLS_NOT_LET_GO]:
@@ -346,11 +359,7 @@ class Verdict(HoldsWrenches, InNotebooks):
     def _repeats(self) -> tuple[NoisyTrial, ...]:
         return () if self.robustness is None else self.robustness.trials
 
-    @computed_field
-    @property
-    def good(self) -> bool:
-        """Whether all wrenches held, negative controls let go, and nothing was contradicted."""
-        return self.held and self.controls_let_go and not self.mismatches
+    good = computed_field(HoldsWrenches.good)  # type: ignore[override]
 
     def _html(self) -> str | None:
         """Return a picture of the scene with how the trials ended, the failed ones first."""

@@ -1,11 +1,13 @@
 """Turns a TOML file of settings (`--config`) into flags of an equivalent command line."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import Any, cast, get_args
 
 from tyro.conf import UseAppendAction
 
+from grasp_core.declared import default_of
 from grasp_core.errors import InputError
 from grasp_core.messages import near
 from sim_validate.commands.exit_codes import FlagsError
@@ -61,7 +63,9 @@ def _as_flags(flag: Flag, value: Any) -> list[str]:
     if any(isinstance(part, dict) for item in items for part in _items(item)):
         raise InputError(f"{flag.name}: expected a value or a list, got a table")
     if isinstance(value, bool):
-        return [word] if value else []
+        usual = next(default_of(each) for each in fields(flag.owner) if each.name == flag.field)
+        said = word if value else word.replace("--", "--no-", 1)
+        return [] if value is usual else [said]
     if listed(flag.kind) is not None:
         return [word, ",".join(map(str, items))]
     if UseAppendAction in get_args(flag.kind)[1:]:

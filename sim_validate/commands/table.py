@@ -75,7 +75,7 @@ COMMANDS: Mapping[str, Command] = {
         "Look for poses in which a hand stands in grasps: palm pose and joints, checked exactly.",
     ),
     "hand": Command(
-        "hands.flags:Hand", "hands.command:show_hand",
+        "hands.flags:ShownHand", "hands.command:show_hand",
         "Show what a hand was read as: fingers, joints with ranges and torque limits, fingertips.",
     ),
     "dataset build": Command(
@@ -147,7 +147,7 @@ analyze plan/grasps.json --json
 transfer plan/grasps.json part-v2.stl --unit mm --out carried
 transfer plan/grasps.json part-v2.stl --unit mm --distance-m 0.005 --angle-deg 2
 reach plan/grasps.json --hand allegro --out reached
-reach plan/grasps.json --hand my_hand.xml --fingertips ff,mf,rf,th --table 0 0 -1
+reach plan/grasps.json --hand my_hand.xml --fingertips ff,mf,rf,th --table-down 0 0 -1
 reach plan/grasps.json --hand leap --simulate --protocol dexgraspbench --out reached
 hand allegro
 hand my_hand.xml --fingertips ff,mf,rf,th

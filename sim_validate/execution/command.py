@@ -28,7 +28,7 @@ from sim_validate.commands import simulation_flags
 from sim_validate.commands.console import TABLE_ROWS, Reporter, warn_of
 from sim_validate.commands.exit_codes import Exit, FlagsError
 from sim_validate.engine.setup import Setup, physics_from_file, with_planned_radius
-from sim_validate.execution.execute import ExecutionJob, Fingertips, executed
+from sim_validate.execution.execute import ExecutionJob, SpringFingers, executed
 from sim_validate.execution.verdict import (
     ExecutedGrasp,
     Execution,
@@ -45,13 +45,13 @@ from sim_validate.files.results_folder import remove_results
 from sim_validate.planning.asked_objects import asked_grasps, grasp_with_id
 from sim_validate.settings import ChosenExecution, ExecutionSettings, Holding
 
-EXPLAINED = ("load_multiple", "payload_kg", "least_predicted_loss")
+EXPLAINED_FIGURES = ("load_multiple", "payload_kg", "least_predicted_loss")
 """Figures whose meaning is said below their table."""
 ENOUGH_MEANS = (
     "enough: the least --push-n, with the --tip-stiffness-n-per-m that was used or the least that "
     "it takes; docs/simulation.md says what it does not promise"
 )
-SLIPS = "first slips, predicted/simulated"
+SLIPS_TITLE = "first slips, predicted/simulated"
 SLIPS_MEAN = (
     "first slip: least multiple of the trials' loads at which a contact slips; above one none "
     "does, and in simulation 1.00 also stands for a slip once the whole weight had come"
@@ -103,9 +103,9 @@ def _show(found: Executions, reporter: Reporter) -> None:
     kinds, shown = settings.trials, found.grasps[:TABLE_ROWS]
     reporter.records("executions", found.grasps)
     for figure in figures(ExecutedGrasp):
-        if figure.name in EXPLAINED:
+        if figure.name in EXPLAINED_FIGURES:
             reporter.say(f"{figure.shown.heading}: {figure.explained}")
-    for title, cell in (("trials survived", _survived), (SLIPS, _slips)):
+    for title, cell in (("trials survived", _survived), (SLIPS_TITLE, _slips)):
         rows = [(each.id, *(cell(each.execution, kind) for kind in kinds)) for each in shown]
         reporter.table(title, ("grasp", *kinds), rows)
     reporter.say(SLIPS_MEAN)
@@ -160,10 +160,10 @@ def _losses(found: Executions) -> Iterator[str]:
             yield from (f"{each.id}: {line}" for line in said)
 
 
-Held = TypeVar("Held", bound=Holding)
+SomeHolding = TypeVar("SomeHolding", bound=Holding)
 
 
-def holding(given: Held, body: Polyhedron, finger: Finger | None) -> Held:
+def holding(given: SomeHolding, body: Polyhedron, finger: Finger | None) -> SomeHolding:
     """Complete what holds an object: its mass, and fingertips as planned if no flag gives them."""
     planned = None if finger is None else finger.radius_m
     radius = planned if given.tip_radius_m is None else given.tip_radius_m
@@ -260,7 +260,7 @@ def _held(
     settings = extended(ExecutionSettings, own)
 
     def text_of(grasp: Grasp) -> str:
-        fingers = Fingertips(saved.body, grasp.contacts, friction)
+        fingers = SpringFingers(saved.body, grasp.contacts, friction)
         best = fingers.squeeze(settings)
         if best.scale < 1.0:
             reporter.warn(

@@ -64,8 +64,8 @@ from sim_validate.engine.known_cases import (
     two_digits,
 )
 from sim_validate.execution import paths
-from sim_validate.execution.paths import Drive, Table, idle, samples, smoother
-from sim_validate.execution.simulate import SLID, HeldBench, HeldMotion, outcome
+from sim_validate.execution.paths import TablePlane, TrialDrive, idle, samples, smoother
+from sim_validate.execution.simulate import SLIPPED_BY, HeldBench, HeldMotion, outcome
 
 DOWN = np.array(UPRIGHT)
 WEIGHT_M_PER_S2 = GRAVITY_M_PER_S2 * DOWN
@@ -275,7 +275,7 @@ def _oblique(case: HeldCase) -> GateCheck:
     return met(name, motion, (1.0 + WINDOW) * found.first_slip)
 
 
-def _ramp(case: HeldCase, rising: float, way: Array = DOWN) -> Drive:
+def _ramp(case: HeldCase, rising: float, way: Array = DOWN) -> TrialDrive:
     """Return the drive in which a weight grows past slip, a part of it as the palm's rise."""
     low = (1.0 - WINDOW) / (1.0 + WINDOW)
     share = np.concatenate([low * case.rise(), low + (1.0 - low) * case.rise(0.5 * SLOW_RISE)])
@@ -290,7 +290,7 @@ def _creep(case: HeldCase, motion: HeldMotion) -> GateCheck:
     last, slid = _period(case), motion.slides()
     speed = float(np.abs(slid[-1] - slid[-last]).max()) / ((last - 1) * SAMPLE_S)
     longest = len(paths.turned_weight(case.frequency)) * SAMPLE_S
-    far = speed * longest / (SLID * case.radius_m)
+    far = speed * longest / (SLIPPED_BY * case.radius_m)
     name = "creep of contacts that stick in a whole trial, over what counts as slipped"
     return little(name, motion, far, CREEP)
 
@@ -413,12 +413,12 @@ def free_box(case: HeldCase) -> tuple[GateCheck, ...]:
     )
 
 
-def _apart(case: HeldCase, bench: HeldBench, drive: Drive) -> Drive:
+def _apart(case: HeldCase, bench: HeldBench, drive: TrialDrive) -> TrialDrive:
     """Take the fingers and the table away from the box; the table faces it from above."""
     layout = bench.scene.layout
     back = -FINGERS_APART * case.radius_m * layout.frames[:, :, 0]
     reached = np.einsum("kij,ki->kj", layout.axes, back)
-    above = Table(-AWAY * case.radius_m * DOWN, DOWN)
+    above = TablePlane(-AWAY * case.radius_m * DOWN, DOWN)
     return replace(drive, grasping=np.zeros(len(drive)), reached=reached, table=above)
 
 
@@ -427,9 +427,9 @@ def _lifted(case: HeldCase, bench: HeldBench) -> tuple[GateCheck, GateCheck]:
     height = RAISED * weight / (BOX_FINGERS * case.stiffness_n_per_m)
     drive, begun = paths.lift(-DOWN, height, SAMPLE_S * len(case.rise()))
     share = weight / (case.object_kg * GRAVITY_M_PER_S2)
-    table = Table(case.halves[2] * DOWN, -DOWN)
+    table = TablePlane(case.halves[2] * DOWN, -DOWN)
     (motion,) = bench.run([replace(drive, gravity=share * drive.gravity, table=table)])
-    still = paths.samples(0.5 * paths.REST_S)
+    still = paths.samples(0.5 * paths.STILL_S)
     carried = -(motion.table @ DOWN) / weight
     before = float(carried[begun - still : begun].mean())
     after = float(np.abs(carried[-still:]).max())
@@ -465,7 +465,8 @@ def struck_box(case: HeldCase) -> GateCheck:
     return GateCheck(name, math.nan if faulty else changed, 0.0, CHANGED)
 
 
-def _blow(case: HeldCase) -> Drive:
+def _blow(case: HeldCase) -> TrialDrive:
+    """Return the drive of half a sine of force along x, as long as a knock, and what follows."""
     strike = paths.samples(paths.STRIKE_S)
     after = max(LEAST_WATCHED, paths.samples(PERIODS_WATCHED * 2.0 * np.pi / case.frequency))
     wrenches = np.zeros((strike + after, 6))

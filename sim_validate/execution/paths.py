@@ -11,7 +11,7 @@ The direction of gravity in `weight` follows a spiral on the sphere,
 
     polar angle = pi u,   azimuth = 2 pi N u,   0 <= u <= 1,                              (1)
 
-with N turns, whose neighbouring turns are `SPACING` apart: as close as 42 directions are that
+with N turns, whose neighbouring turns are `TURN_GAP` apart: as close as 42 directions are that
 share the sphere evenly. u is chosen so that the speed on the sphere is the same everywhere.
 """
 
@@ -32,7 +32,7 @@ from sim_validate.engine.schedules import smooth
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
+class SampleRows:
     """A value with a row for each sample in the fields that `ROWS` names."""
 
     ROWS: ClassVar[tuple[str, ...]]
@@ -48,7 +48,7 @@ class Rows:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Table:
+class TablePlane:
     """A table under the object: a plane through a point, facing the object along a unit normal."""
 
     point: Array
@@ -61,7 +61,7 @@ class Table:
 
 
 @dataclass(frozen=True, eq=False)
-class Drive(Rows):
+class TrialDrive(SampleRows):
     """What is applied in each of the n samples of a trial."""
 
     ROWS = ("accelerations", "gravity", "wrenches", "grasping", "shares")
@@ -82,7 +82,7 @@ class Drive(Rows):
     reached: Array | None = None
     """Displacements of the fingertips along their springs at the start, (k, 3) [m], from where
     their commands then count; None for none."""
-    table: Table | None = None
+    table: TablePlane | None = None
     friction: Array | None = None
     """Frictions of the fingertips, (k,); None for those of the scene."""
     lost: tuple[float, float] | None = None
@@ -92,10 +92,10 @@ class Drive(Rows):
         return len(self.shares)
 
 
-def idle(count: int) -> Drive:
+def idle(count: int) -> TrialDrive:
     """Return a drive of some samples in which nothing is applied to a squeezed object."""
     nothing = np.zeros((count, WRENCH))
-    return Drive(
+    return TrialDrive(
         accelerations=nothing, gravity=nothing[:, :3], wrenches=nothing, grasping=np.ones(count),
         shares=np.zeros(count), velocity=np.zeros(3),
     )  # fmt: skip
@@ -106,22 +106,20 @@ CLOSE_S = 0.15
 LAY_S = 0.05
 """Time in which an object on a table gets its weight, before fingers close; laid down at once, it
 would sink and rise while they hold on to it [s]."""
-REST_S = 0.1
+STILL_S = 0.1
 """Time before the load comes, and after it has gone [s]."""
 RISE_S = 0.15
-"""Time in which a load grows [s]."""
-SPACING = 0.55
+TURN_GAP = 0.55
 """Angle between neighbouring turns of gravity's spiral [rad]."""
-TURNING = (1.0, 20.0)
+SPIRAL_RATES = (1.0, 20.0)
 """Least and largest speed of gravity's direction [rad/s]."""
-SLOW = 0.15
+SPIRAL_SLOWNESS = 0.15
 """Speed of gravity's direction, relative to the held object's lowest natural frequency: it lags
 by some degrees, and gains 2 % at most."""
 CYCLES = 2
 """Cycles of a shake at its full size, after one in which it grows."""
 STRIKE_S = 0.02
-"""Duration of a knock [s]."""
-WHOLE = 1e-9
+WHOLE_SLACK = 1e-9
 """Difference from a whole number that is rounding."""
 TINY_M = 1e-12
 """Rise by which fingers that do not give have taken the weight [m]."""
@@ -144,21 +142,21 @@ WEIGHING = samples(RISE_S)
 """Samples in which the weight comes, before the load of `shake`, `stop` and `knock`."""
 
 
-def closing(after_s: float = REST_S) -> Drive:
+def closing(after_s: float = STILL_S) -> TrialDrive:
     """Return the drive in which fingers build up the squeeze on a weightless object."""
     grasping = np.concatenate([smooth(samples(CLOSE_S)), np.ones(samples(after_s))])
     return replace(idle(len(grasping)), grasping=grasping)
 
 
-def loaded(share: Array, gravity: Array) -> Drive:
+def loaded(share: Array, gravity: Array) -> TrialDrive:
     """Return the drive in which a squeezed object comes under gravity, (3,) or (n, 3) [m/s^2]."""
     return replace(idle(len(share)), gravity=share[:, None] * gravity, shares=share)
 
 
-def turned_weight(slowest_rad_per_s: float) -> Drive:
+def turned_weight(slowest_rad_per_s: float) -> TrialDrive:
     """Return the drive of `weight`: gravity turned through all directions."""
-    speed = float(np.clip(SLOW * slowest_rad_per_s, *TURNING))
-    turns = math.pi / SPACING
+    speed = float(np.clip(SPIRAL_SLOWNESS * slowest_rad_per_s, *SPIRAL_RATES))
+    turns = math.pi / TURN_GAP
     fine = np.arange(2001) / 2000.0
     points = _spiral(fine, turns)
     lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
@@ -176,12 +174,12 @@ def _spiral(u: Array, turns: float) -> Array:
     return np.stack([flat * np.cos(azimuth), flat * np.sin(azimuth), np.cos(polar)], axis=1)
 
 
-def weighed(gravity: Array, count: int = WEIGHING) -> Drive:
+def weighed(gravity: Array, count: int = WEIGHING) -> TrialDrive:
     """Return the drive in which the weight comes, and stays for so many samples."""
     return loaded(np.concatenate([smooth(WEIGHING), np.ones(count)]), gravity)
 
 
-def shake(gravity: Array, axis: Array, frequency_hz: float) -> Drive:
+def shake(gravity: Array, axis: Array, frequency_hz: float) -> TrialDrive:
     """Return the drive of a shake under weight; `axis` (6,) is its acceleration."""
     rate = 2.0 * math.pi * frequency_hz
     grow, hold = 1.0 / frequency_hz, CYCLES / frequency_hz
@@ -196,12 +194,12 @@ def shake(gravity: Array, axis: Array, frequency_hz: float) -> Drive:
     return replace(weighed(gravity, wave), accelerations=accelerations)
 
 
-def stop(gravity: Array, way: Array, deceleration: float, speed: float) -> Drive:
+def stop(gravity: Array, way: Array, deceleration: float, speed: float) -> TrialDrive:
     """Return the drive of a stop of a palm that moves in a direction, under weight."""
-    rest = samples(REST_S)
+    rest = samples(STILL_S)
     whole = speed / deceleration / SAMPLE_S  # samples at the full deceleration
-    rise = max(1, int(min(STOP_RISE_S / SAMPLE_S, whole) + WHOLE))
-    flat = max(0, int(whole - rise + WHOLE))
+    rise = max(1, int(min(STOP_RISE_S / SAMPLE_S, whole) + WHOLE_SLACK))
+    flat = max(0, int(whole - rise + WHOLE_SLACK))
     # a rise and its fall are as long as one; what is left of a sample finds its place in the fall
     left = min(max(whole - rise - flat, 0.0), 1.0)
     fall = np.sort(np.append(1.0 - smooth(rise), left))[::-1]
@@ -213,9 +211,9 @@ def stop(gravity: Array, way: Array, deceleration: float, speed: float) -> Drive
     return replace(under, accelerations=accelerations, velocity=speed * way)
 
 
-def knock(gravity: Array, impulse: Array, point: Array) -> Drive:
+def knock(gravity: Array, impulse: Array, point: Array) -> TrialDrive:
     """Return the drive of a knock at a point under weight."""
-    strike, rest = samples(STRIKE_S), samples(REST_S)
+    strike, rest = samples(STRIKE_S), samples(STILL_S)
     wrenches = np.zeros((WEIGHING + strike + rest, 6))
     shape = np.sin(np.pi * (np.arange(strike) + 0.5) / strike)
     force = impulse / (SAMPLE_S * shape.sum())
@@ -224,10 +222,12 @@ def knock(gravity: Array, impulse: Array, point: Array) -> Drive:
     return replace(weighed(gravity, strike + rest), wrenches=wrenches)
 
 
-def lift(up: Array, height: float, duration_s: float, give_m: float = 0.0) -> tuple[Drive, int]:
+def lift(
+    up: Array, height: float, duration_s: float, give_m: float = 0.0
+) -> tuple[TrialDrive, int]:
     """Return the drive of a lift from a table, and the sample at which it begins."""
     laid = samples(LAY_S)
-    before, count, rest = laid + samples(CLOSE_S + REST_S), samples(duration_s), samples(REST_S)
+    before, count, rest = laid + samples(CLOSE_S + STILL_S), samples(duration_s), samples(STILL_S)
     u = np.arange(count + 1) / count
     speeds = 30.0 * u**2 * (1.0 - u) ** 2 * height / duration_s  # of the path with least jerk
     accelerations = np.zeros((before + count + rest, 6))
@@ -241,5 +241,5 @@ def lift(up: Array, height: float, duration_s: float, give_m: float = 0.0) -> tu
     share[before : before + count] = np.minimum(risen / max(min(give_m, height), TINY_M), 1.0)
     weight = np.concatenate([smooth(laid), np.ones(total - laid)])
     gravity = -GRAVITY_M_PER_S2 * weight[:, None] * up
-    drive = Drive(accelerations, gravity, np.zeros((total, 6)), grasping, share, np.zeros(3))
+    drive = TrialDrive(accelerations, gravity, np.zeros((total, 6)), grasping, share, np.zeros(3))
     return drive, before

@@ -50,7 +50,7 @@ from typing import Any
 import numpy as np
 
 from grasp_core.arrays import Array, cross
-from grasp_core.closure.contacts import cross_matrix, grasp_map
+from grasp_core.closure.contacts import WRENCH, cross_matrix, grasp_map
 from grasp_core.errors import InputError, NoForcesError, SolverError
 from grasp_core.execution.best_squeeze import searched
 from grasp_core.execution.beyond_slip import loss_multiples
@@ -64,12 +64,10 @@ from grasp_core.solvers.ties import first_best
 from scenes.mujoco.held_scene import SAMPLE_S, HeldLayout, HeldScene, gravity_of
 from scenes.mujoco.mjcf_text import rotations
 from sim_validate.execution import paths
-from sim_validate.execution.paths import Drive
+from sim_validate.execution.paths import TrialDrive
 from sim_validate.execution.trials import Trial, trials_of
 from sim_validate.execution.verdict import Enough, Skipped
 from sim_validate.settings import ExecutionSettings
-
-POSE = 6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,10 +87,10 @@ class HeldDynamics:
 
     def __init__(self, grip: Grip, layout: HeldLayout) -> None:
         self.grip, self.layout, axes = grip, layout, layout.axes
-        self.maps: Array = grasp_map(grip.arms).reshape(POSE, -1, 3).transpose(1, 0, 2)  # W_i
+        self.maps: Array = grasp_map(grip.arms).reshape(WRENCH, -1, 3).transpose(1, 0, 2)  # W_i
         self.dampers: Array = np.einsum("kij,kj,klj->kil", axes, layout.damping, axes)  # C_i
         self.tips: Array = np.einsum("kij,kj,klj->kil", axes, layout.tip_masses, axes)  # m_i
-        self.own = np.zeros((POSE, POSE))  # M_o
+        self.own = np.zeros((WRENCH, WRENCH))  # M_o
         self.own[:3, :3] = layout.object_kg * np.eye(3)
         self.own[3:, 3:] = layout.inertia_kg_m2
         # M and C
@@ -124,10 +122,10 @@ class HeldDynamics:
         losses = np.minimum(sticking, np.where(turning, slips, beyond))
         return list(zip(slips.tolist(), losses.tolist(), strict=True))
 
-    def expected(self, drives: Sequence[Drive]) -> list[Expected]:
+    def expected(self, drives: Sequence[TrialDrive]) -> list[Expected]:
         """Solve (1) for each drive of a grip that is stable at rest."""
         lengths = [len(drive) for drive in drives]
-        loads = np.zeros((len(drives), max(lengths), POSE))
+        loads = np.zeros((len(drives), max(lengths), WRENCH))
         bases = np.zeros((len(drives), max(lengths), *self.layout.contacts.shape))
         for place, drive in enumerate(drives):
             loads[place, : len(drive)], bases[place, : len(drive)] = self._load(drive)
@@ -145,7 +143,7 @@ class HeldDynamics:
             )
         return found
 
-    def _load(self, drive: Drive) -> tuple[Array, Array]:
+    def _load(self, drive: TrialDrive) -> tuple[Array, Array]:
         """Return w of (2), (n, 6), and the accelerations b_i, (n, k, 3), in the palm's axes."""
         layout, turning = self.layout, drive.accelerations[:, 3:]
         angles = SAMPLE_S * np.cumsum(SAMPLE_S * np.cumsum(turning, axis=0), axis=0)
@@ -183,31 +181,31 @@ class HeldDynamics:
         linalg: Any = importlib.import_module("scipy.linalg")
         inverse = np.linalg.inv(self.mass)
         stiff, damp = inverse @ self.grip.grasp_stiffness, inverse @ self.damping
-        system = np.zeros((3 * POSE, 3 * POSE))
-        system[:POSE, POSE : 2 * POSE] = np.eye(POSE)
-        system[POSE : 2 * POSE] = np.hstack([-stiff, -damp, inverse])
-        advanced: Array = linalg.expm(SAMPLE_S * system)[: 2 * POSE]
-        step, gain = advanced[:, : 2 * POSE].T, advanced[:, 2 * POSE :].T
-        states = np.zeros((*loads.shape[:2], 2 * POSE))
+        system = np.zeros((3 * WRENCH, 3 * WRENCH))
+        system[:WRENCH, WRENCH : 2 * WRENCH] = np.eye(WRENCH)
+        system[WRENCH : 2 * WRENCH] = np.hstack([-stiff, -damp, inverse])
+        advanced: Array = linalg.expm(SAMPLE_S * system)[: 2 * WRENCH]
+        step, gain = advanced[:, : 2 * WRENCH].T, advanced[:, 2 * WRENCH :].T
+        states = np.zeros((*loads.shape[:2], 2 * WRENCH))
         pushed = loads @ gain
-        state = np.zeros((len(loads), 2 * POSE))
+        state = np.zeros((len(loads), 2 * WRENCH))
         for sample in range(loads.shape[1]):
             state = state @ step + pushed[:, sample]
             states[:, sample] = state
-        motion, speed = states[..., :POSE], states[..., POSE:]
+        motion, speed = states[..., :WRENCH], states[..., WRENCH:]
         acceleration = loads @ inverse.T - motion @ stiff.T - speed @ damp.T
         return np.stack([motion, speed, acceleration])[..., None, :, None]
 
 
-CLEAR = 1.1
+NO_LOSS = 1.1
 """Predicted loss of the trials that is asked for: predictions beyond a slip are not exact."""
-ROUNDS = 8
+MOST_ASKED = 8
 """Most times that more is asked; two are usual."""
-NEAR = 1.05
+FINE_RATIO = 1.05
 """Ratio of a stiffness that is enough to one that is not, at which the search for it ends."""
 FIRM = 1e4
 """Stiffness at which no squeeze makes a grip unstable, in loads over the object's radius."""
-UP = 1.005
+ROUNDED_BY = 1.005
 """Factor by which numbers are at least what they were when they are rounded to three digits."""
 
 
@@ -219,7 +217,7 @@ class NoSqueezeError(NoForcesError):
         self.enough = enough
 
 
-SPARE = 0.05
+SURFACE_SPARE = 0.05
 """How much farther a curved surface is there than fingertips come, in object radii."""
 
 
@@ -257,7 +255,7 @@ class Holder(ABC):
             return None
         turn = settings.most_rad + math.radians(settings.off_deg)
         moved = settings.most_m + settings.off_mm / 1000.0
-        return moved + (turn + SPARE) * self.body.radius + float(grip.tip_radius_m.max())
+        return moved + (turn + SURFACE_SPARE) * self.body.radius + float(grip.tip_radius_m.max())
 
 
 def planned(
@@ -284,16 +282,16 @@ def found_enough(holder: Holder, settings: ExecutionSettings) -> Enough:
     except (InputError, SolverError) as error:
         return Enough(multiple, reason=str(error))
     found = None
-    for _ in range(ROUNDS):
+    for _ in range(MOST_ASKED):
         own = _stiff_enough(holder, settings, (stiffness, firm), multiple)
         if own is None:
             break
         best = holder.squeeze(own)
         slip, loss = _predicted(holder, own, best)
         found = Enough(best.scale, own.push_n, own.tip_stiffness_n_per_m, loss)
-        if loss >= CLEAR:
+        if loss >= NO_LOSS:
             break
-        more, stiffness = NEAR * CLEAR / max(loss, 0.5), own.tip_stiffness_n_per_m
+        more, stiffness = FINE_RATIO * NO_LOSS / max(loss, 0.5), own.tip_stiffness_n_per_m
         if slip > loss:
             stiffness *= more
         else:
@@ -352,7 +350,7 @@ def _stiff_enough(
     if (found := tried(low)) is not None:
         return found
     found = tried(high)
-    while found is not None and high > NEAR * low:
+    while found is not None and high > FINE_RATIO * low:
         middle = math.sqrt(low * high)
         if (better := tried(middle)) is None:
             low = middle
@@ -364,7 +362,6 @@ def _stiff_enough(
 def _predicted(
     holder: Holder, settings: ExecutionSettings, best: BestSqueeze
 ) -> tuple[float, float]:
-    """Predict the multiples of first slip and of loss, of the trial that is lost first."""
     # all misplacements have the prediction of the weight
     _, dynamics, trials, _ = planned(holder, replace(settings, misplacements=1), best)
     found = dynamics.losses(trials, settings)
@@ -374,4 +371,4 @@ def _predicted(
 
 
 def _rounded_up(value: float) -> float:
-    return float(f"{UP * value:.3g}")
+    return float(f"{ROUNDED_BY * value:.3g}")

@@ -23,8 +23,8 @@ again with contacts that stick, and the least of all samples is the multiple.
 
 An object that leaves a table rocks on its last edge and rings, so that a contact may touch its cone
 for some milliseconds, slide by micrometres, and hold. Such a touch is no slip: a row of samples on
-the cone counts only if the contact slides by more than `TOUCHED` in it, or if the row reaches the
-full load.
+the cone counts only if the contact slides by more than `TOUCH_SLIDE` in it, or if the row reaches
+the full load.
 """
 
 import math
@@ -41,9 +41,9 @@ from grasp_core.execution.first_slip import slip_steps
 from scenes.mujoco.held_scene import SAMPLE_S, HeldLayout, HeldScene, hinged, palm_armature
 from scenes.mujoco.mjcf_text import rotations
 from sim_validate.engine.stepping import OBJECT_END, PALM_END, Bench, Health, Motion, Told
-from sim_validate.execution.paths import WHOLE, Drive, Rows, closing
+from sim_validate.execution.paths import WHOLE_SLACK, SampleRows, TrialDrive, closing
 
-KEPT = ("qvel", "qfrc_constraint", "state")
+KEPT_STATE = ("qvel", "qfrc_constraint", "state")
 """What is read beside the positions of joints."""
 BOUNDLESS = 1e100
 """Size from which on a number of the simulator says nothing."""
@@ -53,7 +53,7 @@ single precision, and about as deep as objects rest."""
 
 
 @dataclass(frozen=True, eq=False)
-class HeldMotion(Rows):
+class HeldMotion(SampleRows):
     """Where object, palm and fingertips were in each of the n samples of a trial.
 
     What is in the world's frame is kept, and what the palm or the object sees is made from it.
@@ -152,17 +152,19 @@ class HeldBench(Bench[HeldScene]):
     ) -> None:  # fmt: skip
         step_s = scene.physics.timestep if step_s is None else step_s
         chunk = max(1, round(sample_s / step_s))
-        if sample_s == SAMPLE_S and abs(chunk * step_s - SAMPLE_S) > WHOLE * SAMPLE_S:
+        if sample_s == SAMPLE_S and abs(chunk * step_s - SAMPLE_S) > WHOLE_SLACK * SAMPLE_S:
             raise InputError(
                 f"physics.timestep must divide the sample of {SAMPLE_S:g} s, got {step_s:g} s; "
                 "take 0.00125 s"
             )
-        super().__init__(scene, threads=threads, chunk=chunk, step_s=step_s, kept=KEPT)
+        super().__init__(scene, threads=threads, chunk=chunk, step_s=step_s, kept=KEPT_STATE)
         self.lost_m = lost_m
         self.tips = self.shapes(scene.layout.holder.tip_names)
         self.rubbing = slice(min(self.tips), max(self.tips) + 1)
 
-    def run(self, drives: Sequence[Drive], start: Array | None = None) -> tuple[HeldMotion, ...]:
+    def run(
+        self, drives: Sequence[TrialDrive], start: Array | None = None
+    ) -> tuple[HeldMotion, ...]:
         """Simulate trials, all from the same state, (size,), or from one each, (n, size)."""
         losing = _Losing([drive.lost or (self.lost_m, math.inf) for drive in drives])
         told = [self._told_by(drive, fresh=start is None) for drive in drives]
@@ -172,7 +174,7 @@ class HeldBench(Bench[HeldScene]):
             for place, (motion, drive) in enumerate(zip(motions, drives, strict=True))
         )
 
-    def settled(self, drive: Drive, start: Array | None = None) -> tuple[HeldMotion, Array]:
+    def settled(self, drive: TrialDrive, start: Array | None = None) -> tuple[HeldMotion, Array]:
         """Simulate one trial; return its motion and the simulator's complete state at its end."""
         (motion,) = self.run([drive], start)
         return motion, motion.states[-1]
@@ -189,7 +191,7 @@ class HeldBench(Bench[HeldScene]):
             joints[PALM_END + 1 :] = self.scene.layout.holder.joints(reached)
         return joints
 
-    def _told_by(self, drive: Drive, *, fresh: bool) -> Told:
+    def _told_by(self, drive: TrialDrive, *, fresh: bool) -> Told:
         """Return what a drive tells the scene; where its trial is fresh, it begins in its pose."""
         layout, n, joints, table, friction = self.scene.layout, len(drive), None, None, None
         loads = drive.wrenches.copy()
@@ -275,20 +277,20 @@ def cosines(turned: Array) -> Array:
 ON_CONE = 0.9995
 """Tangential force, relative to friction times normal force, at which a contact counts as on its
 cone: the simulator's contacts approach it within as much."""
-SLID = 2e-3
+SLIPPED_BY = 2e-3
 """Distance that counts as slipped, in object radii: between two samples a contact may slip and
 hold again, and rolling over large turns is known to about a tenth of it."""
-TOUCHED = 1e-4
+TOUCH_SLIDE = 1e-4
 """Distance that a contact on its cone may slide while an object leaves a table and still count as
 held, in object radii: contacts that stick creep by a twentieth of it in a lift."""
 IDLE = 1e-3
 """Normal force at rest, relative to the largest, below which a fingertip does not push."""
-FULL = 0.999
+FULL_LOAD = 0.999
 """Share of the load above which it is all there."""
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class TrialFigures:
     """What became of an object in one trial, against its place when the trial began.
 
     The figures are those of `ExecutionTrial`.
@@ -299,20 +301,20 @@ class Outcome:
     turn_rad: float
     dropped: bool
     slipped: bool
-    """Whether a contact slipped: one was on its cone, or slid by more than `SLID`."""
+    """Whether a contact slipped: one was on its cone, or slid by more than `SLIPPED_BY`."""
     first_slip: float
     """Multiple of the trial's load at which the first contact slips; at most one if one did."""
 
 
-def outcome(motion: HeldMotion, drive: Drive, friction: Array, begun: int = 0) -> Outcome:
+def outcome(motion: HeldMotion, drive: TrialDrive, friction: Array, begun: int = 0) -> TrialFigures:
     """Say what became of the object since a sample of a trial."""
     moved, turned, radius_m = motion.shifts[begun:], motion.turns[begun:], motion.layout.radius_m
     turns = np.arccos(np.clip(cosines(turned @ turned[0].T), -1.0, 1.0))
     slid = float(motion.slides(begun).max(initial=0.0))
     leaving = None if drive.table is None else motion.slid(begun) / radius_m
     multiple = _first_slip(motion.pushes, drive.shares, friction, begun, leaving)
-    slipped = multiple <= 1.0 or slid > SLID * radius_m
-    return Outcome(
+    slipped = multiple <= 1.0 or slid > SLIPPED_BY * radius_m
+    return TrialFigures(
         slip_m=slid,
         displacement_m=float(np.linalg.norm(moved - moved[0], axis=1).max()),
         turn_rad=float(turns.max()),
@@ -322,7 +324,7 @@ def outcome(motion: HeldMotion, drive: Drive, friction: Array, begun: int = 0) -
     )
 
 
-def sticking_multiple(motion: HeldMotion, drive: Drive, friction: Array, begun: int) -> float:
+def sticking_multiple(motion: HeldMotion, drive: TrialDrive, friction: Array, begun: int) -> float:
     """Return the multiple of the load at which contacts that stick would reach their cones."""
     pushing, _ = _on_cone(motion.pushes, friction, begun)
     if not pushing.any():  # the object was lost before the load came
@@ -376,14 +378,14 @@ def _touches(on_cone: NDArray[np.bool_], shares: Array, slid: Array) -> NDArray[
         edges = np.flatnonzero(np.diff(np.concatenate([[0], own, [0]])))
         for first, end in edges.reshape(-1, 2):
             by = slid[min(end, last), contact] - slid[first - 1, contact]
-            little = np.linalg.norm(by) <= TOUCHED
-            found[first:end, contact] = little and shares[end - 1] < FULL
+            little = np.linalg.norm(by) <= TOUCH_SLIDE
+            found[first:end, contact] = little and shares[end - 1] < FULL_LOAD
     return found
 
 
 def _under_full_load(forces: Array, shares: Array, friction: Array, begun: int) -> float:
     """Return the least multiple of the load at first slip that is seen while all of it is there."""
-    loaded = np.flatnonzero(shares[begun:] >= FULL) + begun
+    loaded = np.flatnonzero(shares[begun:] >= FULL_LOAD) + begun
     return float(_extrapolated(forces, shares, friction, begun, loaded).min(initial=np.inf))
 
 

@@ -46,8 +46,8 @@ from grasp_core.solvers.ties import first_best, largest_first
 from scenes.mujoco.held_scene import HeldLayout
 from sim_validate.engine.misplacement import closed_there, drawn_errors, misplaced_poses, tips_met
 from sim_validate.execution import paths
-from sim_validate.execution.paths import Drive, Table
-from sim_validate.execution.simulate import SLID, HeldBench, HeldMotion, outcome
+from sim_validate.execution.paths import TablePlane, TrialDrive
+from sim_validate.execution.simulate import SLIPPED_BY, HeldBench, HeldMotion, outcome
 from sim_validate.execution.verdict import ExecutionControl, Skipped
 from sim_validate.settings import ExecutionSettings, TrialKind
 
@@ -104,7 +104,8 @@ def resting(body: Polyhedron, tips: Array, radii: Array) -> Rest | None:
 
 
 AXIS_LETTERS = ("x", "y", "z")
-SIGNED_AXES = tuple((sign, axis) for axis in range(3) for sign in (1.0, -1.0))
+AXIS_SIDES = tuple((sign, axis) for axis in range(3) for sign in (1.0, -1.0))
+"""Sign and axis of the six directions of stops and knocks."""
 OF_NO_SIZE: dict[TrialKind, str] = {"shake": "shake_g", "knock": "knock_n_s"}
 """Setting whose zero leaves no trial of a kind."""
 
@@ -115,7 +116,7 @@ class Trial:
 
     kind: TrialKind
     name: str
-    drive: Drive
+    drive: TrialDrive
     begun: int
     apart: bool = False
     """Whether the trial starts with open fingers, not from the squeezed object."""
@@ -123,7 +124,7 @@ class Trial:
     """Number of samples at the start in which the weight comes, as in other trials of the grasp."""
     turning: bool = False
     """Whether the load keeps turning, so that small slips add up."""
-    expected: Drive | None = None
+    expected: TrialDrive | None = None
     """What the prediction is for, if not for the drive itself."""
     starts_closed: bool | None = None
     """Whether fingertips first meet a misplaced object in force closure."""
@@ -159,7 +160,7 @@ def _lift(body: Polyhedron, layout: HeldLayout, settings: ExecutionSettings) -> 
         )
     give_m = layout.object_kg * GRAVITY_M_PER_S2 / layout.stiffness_along(rest.down)
     drive, begun = paths.lift(-rest.down, settings.lift_m, settings.lift_s, give_m)
-    table = Table(rest.height * rest.down, -rest.down)
+    table = TablePlane(rest.height * rest.down, -rest.down)
     return Trial("lift", "lift", replace(drive, table=table), begun - 1, apart=True)
 
 
@@ -173,7 +174,7 @@ def _shakes(layout: HeldLayout, settings: ExecutionSettings) -> Iterator[Trial]:
 
 
 def _stops(layout: HeldLayout, settings: ExecutionSettings) -> Iterator[Trial]:
-    for sign, axis in SIGNED_AXES:
+    for sign, axis in AXIS_SIDES:
         way = sign * np.eye(3)[axis]
         drive = paths.stop(layout.gravity, way, settings.stop_m_per_s2, settings.stop_from_m_per_s)
         yield Trial("stop", f"stop {_side(sign, axis)}", drive, 0, weighing=paths.WEIGHING)
@@ -181,7 +182,7 @@ def _stops(layout: HeldLayout, settings: ExecutionSettings) -> Iterator[Trial]:
 
 def _knocks(layout: HeldLayout, settings: ExecutionSettings) -> Iterator[Trial]:
     """Yield knocks along both sides of each axis, half the object's radius beside its middle."""
-    for sign, axis in SIGNED_AXES:
+    for sign, axis in AXIS_SIDES:
         point = 0.5 * layout.radius_m * np.eye(3)[(axis + 1) % 3]
         drive = paths.knock(layout.gravity, sign * settings.impulse_n_s * np.eye(3)[axis], point)
         yield Trial("knock", f"knock {_side(sign, axis)}", drive, 0, weighing=paths.WEIGHING)
@@ -207,9 +208,8 @@ def _side(sign: float, axis: int) -> str:
     return f"{'+' if sign > 0.0 else '-'}{AXIS_LETTERS[axis]}"
 
 
-WEAK_FRICTION = 0.9
-WEAK_SQUEEZE = 0.9
-"""Friction and squeeze of the controls, relative to the trials'."""
+GRIP_SHARE = 0.9
+"""Friction, or squeeze, of a control, relative to the trials'."""
 SURE = 1.25
 """Load of a control, relative to that at which the analysis says that it slips: fingertips that
 roll to an edge of their face hold up to a tenth more."""
@@ -239,7 +239,7 @@ def run_controls(
     rise_s = min(max(2.0 * paths.RISE_S, FOLLOWED / lowest_frequency), LONGEST_RISE_S)
     share = paths.smooth(paths.samples(rise_s))
     closing, loading = paths.closing(), paths.loaded(share, np.zeros(3))
-    weaker, drives = tuple(weaker_grips(best, bench.scene.layout)), list[Drive]()
+    weaker, drives = tuple(weaker_grips(best, bench.scene.layout)), list[TrialDrive]()
     for each in weaker:
         drive = closing.then(replace(loading, wrenches=share[:, None] * each.load))
         grasping = np.outer(drive.grasping, each.pushing)
@@ -251,12 +251,12 @@ def run_controls(
     )
 
 
-def _judged(weaker: Weaker, motion: HeldMotion, drive: Drive, begun: int) -> ExecutionControl:
+def _judged(weaker: Weaker, motion: HeldMotion, drive: TrialDrive, begun: int) -> ExecutionControl:
     """Say whether a contact slipped under the load, or while fingers closed and one was idle."""
     found = outcome(motion, drive, weaker.friction, begun)
     if weaker.idle:
         closing = motion.slides()[: begun + 1]
-        if float(closing.max()) > SLID * motion.layout.radius_m:
+        if float(closing.max()) > SLIPPED_BY * motion.layout.radius_m:
             return ExecutionControl(weaker.name, let_go=True, first_slip=0.0)
     return ExecutionControl(weaker.name, found.slipped, found.first_slip)
 
@@ -265,15 +265,14 @@ def weaker_grips(best: BestSqueeze, layout: HeldLayout) -> Iterator[Weaker]:
     """Yield the weaker grips of a chosen squeeze, with their loads."""
     grip, load = best.grip, slipping_load(best)
     all_push = np.ones(len(grip.friction))
-    little = replace(grip, friction=WEAK_FRICTION * grip.friction)
-    name = f"friction {WEAK_FRICTION:g}"
-    yield Weaker(name, little.friction, all_push, _sure(little, load) * load)
-    loose, pushing = grip.squeezed(WEAK_SQUEEZE * grip.squeeze), WEAK_SQUEEZE * all_push
-    yield Weaker(f"squeeze {WEAK_SQUEEZE:g}", grip.friction, pushing, _sure(loose, load) * load)
+    little = replace(grip, friction=GRIP_SHARE * grip.friction)
+    yield Weaker(f"friction {GRIP_SHARE:g}", little.friction, all_push, _sure(little, load) * load)
+    loose, pushing = grip.squeezed(GRIP_SHARE * grip.squeeze), GRIP_SHARE * all_push
+    yield Weaker(f"squeeze {GRIP_SHARE:g}", grip.friction, pushing, _sure(loose, load) * load)
     strongest = first_best(layout.pushes.max(axis=1))
     others_push = all_push.copy()
     others_push[strongest] = 0.0
-    left = idle(grip, strongest, layout.axes[strongest] @ layout.pushes[strongest])
+    left = without_push(grip, strongest, layout.axes[strongest] @ layout.pushes[strongest])
     name = "a finger that does not push"
     yield Weaker(name, grip.friction, others_push, _sure(left, load) * load, True)
 
@@ -287,7 +286,7 @@ def _sure(weaker: Grip, load: Array) -> float:
     return max(1.0, SURE * found.multiple) if np.isfinite(found.multiple) else 1.0
 
 
-def idle(grip: Grip, finger: int, push: Array) -> Grip:
+def without_push(grip: Grip, finger: int, push: Array) -> Grip:
     """Return the squeeze that is left by (1) where a finger does not push."""
     maps = grasp_map(grip.arms).reshape(len(grip.elastic_stiffness), -1, 3).transpose(1, 0, 2)
     motion = np.asarray(np.linalg.solve(grip.elastic_stiffness, -maps[finger] @ push), dtype=float)

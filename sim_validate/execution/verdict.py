@@ -27,24 +27,22 @@ from sim_validate.settings import ExecutionSettings, TrialKind
 Fate: TypeAlias = Literal["stuck", "slipped", "dropped", "diverged"]
 """What became of the object: no contact slipped, one did and it was kept, it was lost, or the
 simulator could not follow it."""
-LOST = ("dropped", "diverged")
+LOSING_FATES = ("dropped", "diverged")
 """Fates that no trial survives."""
 CLEAR_OF_SLIP = 1.05
 """Predicted first slip from which on no contact slips, however processors round."""
 
 
-FEWEST_CONTACTS = 2
-MULTIPLE = ".2f"
-"""How multiples of loads are shown."""
+SQUEEZE_CONTACTS = 2
+MULTIPLE_FORM = ".2f"
 DEGREES = math.degrees(1.0)
-UNKNOWN = "-"
+NO_MOTION = "-"
 """What stands for a motion that the simulator could not follow."""
 LOSSES = Compared(items=("no longer survived", "survived now"))
-CONTROLS_HELD = Compared(more, "controls that did not slip")
-PREDICTED, SIMULATED = Compared(less, analysed=True), Compared(less, close="slips")
-MOVED = Compared(more, close="slips")
-FAILED = Compared(lambda _, after: after is not None)
-"""How figures are compared with those of an earlier execution."""
+MORE_HELD = Compared(more, "controls that did not slip")
+LESS_PREDICTED, LESS_SIMULATED = Compared(less, analysed=True), Compared(less, close="slips")
+FARTHER = Compared(more, close="slips")
+REASON_GIVEN = Compared(lambda _, after: after is not None)
 
 
 @declared
@@ -60,21 +58,21 @@ class ExecutionTrial(Declared):
     fate: Annotated[Fate, Shown("fate")]
     """What became of the object: `stuck`, `slipped`, `dropped` or `diverged`. If it was kept, and
     the trial was not survived, it moved or turned too far."""
-    slip_m: Annotated[OrInfinity, Shown("mm slid", ".3g", MILLI, UNKNOWN)]
+    slip_m: Annotated[OrInfinity, Shown("mm slid", ".3g", MILLI, NO_MOTION)]
     """Farthest that a point of contact slid on the object [m]; infinite where the simulator
     diverged, as the next two are."""
-    displacement_m: Annotated[OrInfinity, Shown("mm moved", ".3g", MILLI, UNKNOWN)]
+    displacement_m: Annotated[OrInfinity, Shown("mm moved", ".3g", MILLI, NO_MOTION)]
     """Largest displacement of the centre of mass against the palm [m]."""
-    turn_rad: Annotated[OrInfinity, Shown("deg turned", ".3g", DEGREES, UNKNOWN)]
+    turn_rad: Annotated[OrInfinity, Shown("deg turned", ".3g", DEGREES, NO_MOTION)]
     """Largest turn against the palm [rad]."""
-    predicted_first_slip: Annotated[OrInfinity, Shown("slip predicted", MULTIPLE)]
+    predicted_first_slip: Annotated[OrInfinity, Shown("slip predicted", MULTIPLE_FORM)]
     """Multiple of the trial's load at which the first contact slips, predicted: above one none
     does; for `misplaced`, that of the weight in the planned place."""
-    predicted_loss: Annotated[OrInfinity, Shown("loss predicted", MULTIPLE)]
+    predicted_loss: Annotated[OrInfinity, Shown("loss predicted", MULTIPLE_FORM)]
     """Multiple of the trial's load at which the object is lost, predicted: it moves or turns
     farther than the settings allow, or nothing balances the load; for `misplaced`, that of the
     weight in the planned place."""
-    simulated_first_slip: Annotated[OrInfinity, Shown("slip simulated", MULTIPLE)]
+    simulated_first_slip: Annotated[OrInfinity, Shown("slip simulated", MULTIPLE_FORM)]
     """Multiple of the trial's load at which the first contact slips, from the simulated contact
     forces: one or less if a contact slipped, which is the share of the weight that had come, else
     how far away slip stayed. A slip under a load that follows the whole weight shows as one."""
@@ -98,7 +96,7 @@ class ExecutionTrial(Declared):
                 f"files) where the fate is diverged, and nowhere else; got the fate {self.fate} "
                 f"with {self.slip_m}, {self.displacement_m} and {self.turn_rad}"
             )
-        if self.survived and self.fate in LOST:
+        if self.survived and self.fate in LOSING_FATES:
             raise InputError(f"trial {self.name}: survived is false where the fate is {self.fate}")
 
     @property
@@ -115,7 +113,7 @@ class ExecutionControl(Declared):
     """What is weaker than certified: friction, squeeze, or a finger that does not push."""
     let_go: Annotated[bool, Shown("let go")]
     """Whether a contact slipped, as it must."""
-    first_slip: Annotated[OrInfinity, Shown("first slip", MULTIPLE)]
+    first_slip: Annotated[OrInfinity, Shown("first slip", MULTIPLE_FORM)]
     """Multiple of the load at which a contact slipped."""
 
 
@@ -172,7 +170,7 @@ class Execution(Declared):
     """Mass of the object [kg]."""
     squeeze: Annotated[Array, Shape("k", 3), Field(alias="squeeze_n")]
     """Contact forces at rest, on the object, (k, 3) [N]."""
-    load_multiple: Annotated[float, Shown("load", ".3g", compared=PREDICTED)]
+    load_multiple: Annotated[float, Shown("load", ".3g", compared=LESS_PREDICTED)]
     """Multiple of the object's weight, in any direction, that the squeeze is certified for; this
     less one is the acceleration [g] that the palm may slowly come to."""
     trials: Annotated[tuple[ExecutionTrial, ...], Compared(less)]
@@ -193,7 +191,7 @@ class Execution(Declared):
     or it was not asked for."""
 
     def _check_together(self) -> None:
-        if len(self.squeeze) < FEWEST_CONTACTS:
+        if len(self.squeeze) < SQUEEZE_CONTACTS:
             raise FieldError("squeeze", "must have a force for each contact, at least two, got "
                              f"{len(self.squeeze)}")  # fmt: skip
 
@@ -207,7 +205,7 @@ class Execution(Declared):
     @property
     def predicted_first_slip(
         self,
-    ) -> Annotated[OrInfinity, Shown("slip", MULTIPLE, compared=PREDICTED)]:
+    ) -> Annotated[OrInfinity, Shown("slip", MULTIPLE_FORM, compared=LESS_PREDICTED)]:
         """Least multiple of a trial's load at which a contact slips, predicted."""
         return min((trial.predicted_first_slip for trial in self.trials), default=math.inf)
 
@@ -215,7 +213,7 @@ class Execution(Declared):
     @property
     def simulated_first_slip(
         self,
-    ) -> Annotated[OrInfinity, Shown("in sim", MULTIPLE, compared=SIMULATED)]:
+    ) -> Annotated[OrInfinity, Shown("in sim", MULTIPLE_FORM, compared=LESS_SIMULATED)]:
         """Least multiple of a load that slips in simulation; one also stands for a later slip."""
         return min((trial.simulated_first_slip for trial in self.trials), default=math.inf)
 
@@ -223,7 +221,7 @@ class Execution(Declared):
     @property
     def displacement_m(
         self,
-    ) -> Annotated[OrInfinity, Shown("mm moved", ".3g", MILLI, UNKNOWN, compared=MOVED)]:
+    ) -> Annotated[OrInfinity, Shown("mm moved", ".3g", MILLI, NO_MOTION, compared=FARTHER)]:
         """Largest displacement of the centre of mass against the palm in any trial [m]."""
         return max((trial.displacement_m for trial in self.trials), default=0.0)
 
@@ -235,7 +233,7 @@ class Execution(Declared):
 
     @computed_field
     @property
-    def controls_held(self) -> Annotated[tuple[str, ...], CONTROLS_HELD]:
+    def controls_held(self) -> Annotated[tuple[str, ...], MORE_HELD]:
         """Negative controls that did not slip, as they must, by name."""
         return tuple(control.name for control in self.controls if not control.let_go)
 
@@ -245,12 +243,12 @@ class Execution(Declared):
         return self.predicted_first_slip < CLEAR_OF_SLIP
 
     @figure
-    def slip_m(self) -> Annotated[OrInfinity, MOVED]:
+    def slip_m(self) -> Annotated[OrInfinity, FARTHER]:
         """Farthest that a point of contact slid on the object in any trial [m]."""
         return max((trial.slip_m for trial in self.trials), default=0.0)
 
     @figure
-    def turn_rad(self) -> Annotated[OrInfinity, MOVED]:
+    def turn_rad(self) -> Annotated[OrInfinity, FARTHER]:
         """Largest turn of the object against the palm in any trial [rad]."""
         return max((trial.turn_rad for trial in self.trials), default=0.0)
 
@@ -294,7 +292,7 @@ class ExecutedGrasp(Declared):
     """Hash of the contacts, which tells grasps of one id apart."""
     execution: Annotated[Execution | None, FLAT]
     """Trials and negative controls; None where no squeeze carries the weight."""
-    reason: Annotated[str | None, FAILED] = None
+    reason: Annotated[str | None, REASON_GIVEN] = None
     """Why there is no execution: no squeeze carries the weight, the best one is unstable, or what
     else is wrong with the grasp."""
     enough: Enough | None = None
@@ -330,7 +328,7 @@ class ExecutedGrasp(Declared):
     @property
     def least_predicted_loss(
         self,
-    ) -> Annotated[OrInfinity, Shown("least loss", MULTIPLE, compared=None)]:
+    ) -> Annotated[OrInfinity, Shown("least loss", MULTIPLE_FORM, compared=None)]:
         """Least multiple of a trial's load at which the object is lost, predicted.
 
         It is the number to choose by, but does not see where fingers meet a misplaced object. It is
@@ -398,7 +396,7 @@ def best_executed(grasps: Iterable[ExecutedGrasp]) -> ExecutedGrasp | None:
 
 def ended(trial: ExecutionTrial, settings: ExecutionSettings | None = None) -> str:
     """Say what became of the object, and where it was kept and still failed, why."""
-    if trial.survived or trial.fate in LOST:
+    if trial.survived or trial.fate in LOSING_FATES:
         return trial.fate
     ways = list[str]()
     if settings is not None:
@@ -480,7 +478,7 @@ def totals_in_words(found: Executions) -> list[str]:
 
 def multiple_in_words(multiple: float) -> str:
     """Write the multiple of a load at which something happens."""
-    return cell(multiple, Shown("", MULTIPLE))
+    return cell(multiple, Shown("", MULTIPLE_FORM))
 
 
 def may_slip(predicted_first_slip: float | None) -> bool:

@@ -8,7 +8,6 @@ import math
 import shlex
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from typing import TypeAlias
@@ -19,15 +18,16 @@ from grasp_core.errors import InputError, SolverError
 from grasp_core.figures import NONE, meanings, table
 from grasp_core.files.file_kinds import GRASPS, REACHES
 from grasp_core.files.records import RecordFile, record_of
-from grasp_core.hands.hand import Coupling, Hand
+from grasp_core.hands.hand import Coupling, Hand, load_hand
 from grasp_core.hands.hand_motors import hand_payload
 from grasp_core.hands.reach import HandReach, reach_with, uncoupled
+from grasp_core.hands.settings import ReachSettings
 from grasp_core.messages import MILLI
 from grasp_core.names import HANDS
 from grasp_core.objects.polyhedron import Polyhedron, is_convex
 from grasp_core.planning.result import Plan
 from grasp_core.values import Grasp
-from scenes.hand_files.loading import load_hand
+from scenes.hand_files.building import hand_from_file
 from sim_validate.commands.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.commands.exit_codes import Exit, FlagsError
 from sim_validate.engine.setup import Agenda
@@ -37,50 +37,18 @@ from sim_validate.files.result_files import AboutObject
 from sim_validate.files.results_folder import remove_results
 from sim_validate.hands import flags as hand_flags
 from sim_validate.hands.dexgraspbench import dex_record, write_dex_object, write_dex_record
-from sim_validate.hands.reaches import CarriedMass, ReachedGrasp, Reaches, ReachSettings
-from sim_validate.hands.trials import (
-    MOST_PUSH_N,
-    HandVerdict,
-    executed_by_hand,
-    hand_execution_settings,
-    validate_hand,
-)
+from sim_validate.hands.execute import executed_by_hand, hand_execution_settings
+from sim_validate.hands.reaches import CarriedMass, ReachedGrasp, Reaches
+from sim_validate.hands.validate import MOST_PUSH_N, validate_hand
+from sim_validate.hands.verdict import HandVerdict
 from sim_validate.planning.asked_objects import asked_grasps
 from sim_validate.processes import workers
 from sim_validate.processes.compiling import REACHING, compile_loops, must_compile
 from sim_validate.settings import ExecutionSettings
 
-HELD = Agenda(critical_friction=False)
-"""What hands hold: the usual wrenches, with controls."""
+HAND_AGENDA = Agenda(critical_friction=False)
 Judge: TypeAlias = Callable[[Plan, Hand, Sequence[HandReach]], tuple[Exit, RecordFile]]
 """Judges a hand in its poses by another test; gives the exit code and its results."""
-
-
-@dataclass(frozen=True, slots=True)
-class ReachJob:
-    """What is asked of a hand in each grasp, as it is sent to a worker process."""
-
-    hand: Hand
-    body: Polyhedron
-    friction: float
-    asked: ReachSettings
-    simulated: bool = False  # whether the hand is also to hold test wrenches with its motors
-    execution: ExecutionSettings | None = None
-    """Settings with which it is also to execute the grasp."""
-
-    def __call__(self, grasp: Grasp) -> ReachedGrasp:
-        """Look for a pose in a grasp, and try it as asked."""
-        hand, body, friction = self.hand, self.body, self.friction
-        reach = reach_with(hand, body, grasp, friction, **asdict(self.asked))
-        found = partial(ReachedGrasp, reach, contacts_sha256(grasp.contacts))
-        if not reach.reached:
-            return found()
-        held = executed = None
-        if self.simulated:
-            held = validate_hand(hand, body, reach, friction, agenda=HELD)
-        if self.execution is not None:
-            executed = executed_by_hand(hand, body, reach, friction, self.execution)
-        return found(carried(hand, body, reach, friction), held, executed)
 
 
 def reach_file(command: hand_flags.Reach, reporter: Reporter, judge: Judge | None = None) -> int:
@@ -116,25 +84,40 @@ def reach_file(command: hand_flags.Reach, reporter: Reporter, judge: Judge | Non
 def _reach(command: hand_flags.Reach, hand: Hand, saved: Plan, reporter: Reporter) -> Reaches:
     if command.out is not None:
         remove_results(command.out, REACHES)
-    job = ReachJob(
-        hand, saved.body, saved.friction,
-        ReachSettings(
-            not command.contacts_only, command.table, command.clearance_m, command.starts,
-            command.seed,
-        ),
-        simulated=command.simulate and not command.protocol,  # not those of other tools
-        execution=None if command.mass_kg is None else hand_execution_settings(command.mass_kg),
+    simulate = command.simulate and not command.protocol  # which simulate themselves
+    execution = None if command.mass_kg is None else hand_execution_settings(command.mass_kg)
+    work = partial(
+        reached_grasp, hand, saved.body, friction=saved.friction, asked=command.pose,
+        simulate=simulate, execution=execution,
     )  # fmt: skip
     if saved.grasps and must_compile(REACHING, command.jobs):
         reporter.say("compiling inner loops once, which takes a minute or two")
         compile_loops(REACHING)
-    settings = None if job.execution is None else job.execution.used
-    results, count = workers.each(job, saved.grasps, jobs=command.jobs), len(saved.grasps)
+    settings = None if execution is None else execution.used
+    results, count = workers.each(work, saved.grasps, jobs=command.jobs), len(saved.grasps)
     return reporter.collected(
         "reaching", results, count, ("reached", lambda each: each.reach.reached),
-        partial(Reaches, AboutObject.of(job.body), job.friction, hand, job.asked, settings),
-        command.out,
+        partial(
+            Reaches, AboutObject.of(saved.body), saved.friction, hand, command.pose, settings
+        ), command.out,
     )  # fmt: skip
+
+
+def reached_grasp(
+    hand: Hand, body: Polyhedron, grasp: Grasp, *, friction: float, asked: ReachSettings,
+    simulate: bool, execution: ExecutionSettings | None,
+) -> ReachedGrasp:  # fmt: skip
+    """Look for a pose in a grasp; there hold test wrenches and execute the grasp, if asked to."""
+    reach = reach_with(hand, body, grasp, friction, asked)
+    found = partial(ReachedGrasp, reach, contacts_sha256(grasp.contacts))
+    if not reach.reached:
+        return found()
+    held = executed = None
+    if simulate:
+        held = validate_hand(hand, body, reach, friction, agenda=HAND_AGENDA)
+    if execution is not None:
+        executed = executed_by_hand(hand, body, reach, friction, execution)
+    return found(carried(hand, body, reach, friction), held, executed)
 
 
 def _show(found: Reaches, reporter: Reporter) -> None:
@@ -168,7 +151,8 @@ def _show(found: Reaches, reporter: Reporter) -> None:
 def carried(hand: Hand, body: Polyhedron, reach: HandReach, friction: float) -> CarriedMass | None:
     """Find the mass held in any orientation; None if the hand is not known well enough or weak."""
     with suppress(InputError, SolverError):  # a figure beside the pose, which is there without it
-        return CarriedMass.of(hand_payload(hand, body, reach, friction, max_push_n=MOST_PUSH_N))
+        found = hand_payload(hand, body, reach, friction, max_push_n=MOST_PUSH_N)
+        return CarriedMass(found.lower, found.upper, found.weakest)
     return None
 
 
@@ -252,13 +236,17 @@ SMALL_RANGE = math.radians(10.0)
 SHAPES_WEIGH = "MuJoCo gives links without inertia in the file that of their shapes at 1,000 kg/m^3"
 
 
-def asked_hand(command: hand_flags.Hand | hand_flags.Reach) -> Hand:
+def asked_hand(command: hand_flags.ShownHand | hand_flags.Reach) -> Hand:
     """Load the hand that a command names."""
-    names = (name.strip() for name in command.fingertips.split(","))
-    return load_hand(command.hand, [name for name in names if name])
+    names = [name.strip() for name in command.fingertips.split(",") if name.strip()]
+    if command.hand not in HANDS:
+        return hand_from_file(command.hand, names)
+    if names:
+        raise FlagsError(f"the built-in hand {command.hand} has its own --fingertips")
+    return load_hand(command.hand)
 
 
-def show_hand(command: hand_flags.Hand, reporter: Reporter) -> int:
+def show_hand(command: hand_flags.ShownHand, reporter: Reporter) -> int:
     """Show fingers, joints and fingertips of a hand."""
     hand = asked_hand(command)
     reporter.document(record_of(hand))
@@ -313,7 +301,6 @@ def _weight(hand: Hand) -> str:
 
 
 def _follows(coupling: Coupling) -> str:
-    """Write a coupling as a formula, angles in degrees."""
     said = f"{coupling.joint} = {coupling.ratio:g} {coupling.driver}"
     offset = math.degrees(coupling.offset)
     return f"{said} {'-' if offset < 0.0 else '+'} {abs(offset):.4g} deg" if offset else said

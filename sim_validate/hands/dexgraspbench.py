@@ -41,9 +41,9 @@ from grasp_core.files.json_text import shown, text_of
 from grasp_core.files.records import from_record, keys, record_of
 from grasp_core.files.text_files import read_bytes, write_parts, write_text
 from grasp_core.hands.collisions import tip_gaps
-from grasp_core.hands.hand import PALM, Hand
+from grasp_core.hands.hand import PALM_NAME, Hand
 from grasp_core.hands.hand_arrays import places, tip_jacobians
-from grasp_core.hands.hand_motors import chains, hand_motors
+from grasp_core.hands.hand_motors import hand_motors
 from grasp_core.hands.reach import HandReach, Stance, stance_of, uncoupled
 from grasp_core.kinds import Friction, Quantity, instance, number, path_of, value_of
 from grasp_core.messages import UnfitError
@@ -53,36 +53,36 @@ from grasp_core.values import Contact
 from scenes.mujoco.mjcf_text import IDENTITY_POSE, quaternion, rotations
 from scenes.mujoco.published_tests import HandServos, Postures
 
-FREE = 7
+ROOT_POSE = 7
 """Numbers of a pose: position and quaternion."""
-UNIT = 1e-3
+UNIT_QUATERNION = 1e-3
 """How far the length of a quaternion may be from 1: records have numbers of single precision."""
-MOST_BYTES = 16 * 2**20
+MOST_RECORD_BYTES = 16 * 2**20
 """Largest size of a file: a record has some thousand bytes."""
 DENSITY = 1000.0
 """Density with which the file of an object states its mass [kg/m^3]."""
 TOUCH_M = 0.002
 """Gap or overlap up to which a fingertip counts as touching [m]: DexGraspBench's own."""
-PUSH_N = 5.0
+SQUEEZE_PUSH_N = 5.0
 """Largest normal force of the squeeze unless stated [N]."""
 STRONG_N_M = 1e6
 """Torque limit of a hand whose levers are asked for: no limit matters to them."""
 GAP_M = 0.005
 """How far fingertips have opened in a record's pregrasp unless stated [m]."""
-SHARES = 65
+POSTURE_SHARES = 65
 """Number of postures looked at on the way from the grasp to the pregrasp."""
-FEWEST = 3
+FEWEST_TIPS = 3
 """Fewest fingertips that can hold an object without torsion."""
 
 
 def _rooted(numbers: Array) -> Array:
     """Refuse numbers that do not begin with the pose of a root."""
-    if abs(float(np.linalg.norm(numbers[3:FREE])) - 1.0) > UNIT:
+    if abs(float(np.linalg.norm(numbers[3:ROOT_POSE])) - 1.0) > UNIT_QUATERNION:
         raise UnfitError("must have a quaternion (w, x, y, z) of length 1 in numbers 3 to 6")
     return numbers
 
 
-Configuration = Annotated[Array, Shape("n"), Len(FREE + 1), AfterValidator(_rooted)]
+Configuration = Annotated[Array, Shape("n"), Len(ROOT_POSE + 1), AfterValidator(_rooted)]
 """Pose of the hand's root, then angles of at least one joint, (7 + j,) [m, rad]."""
 
 
@@ -94,7 +94,9 @@ class DexRecord(Declared):
     """Folder of the object, as the record names it."""
     object_scale: Annotated[Quantity, Field(alias="obj_scale")]
     """Factor on the lengths of the object's mesh."""
-    object_pose: Annotated[Array, Shape(FREE), AfterValidator(_rooted), Field(alias="obj_pose")]
+    object_pose: Annotated[
+        Array, Shape(ROOT_POSE), AfterValidator(_rooted), Field(alias="obj_pose")
+    ]
     """Position and quaternion (w, x, y, z) of the object, (7,)."""
     pregrasp: Annotated[Configuration, Field(alias="pregrasp_qpos")]
     """Pose of the hand's root, then joint angles, (7 + j,) [m, rad]."""
@@ -104,11 +106,10 @@ class DexRecord(Declared):
     """Pose of the root and joint angles that servos are told to squeeze with, (7 + j,) [m, rad]."""
 
     def __repr__(self) -> str:
-        return summary("DexRecord", self.object_path, joints=len(self.grasp) - FREE)
+        return summary("DexRecord", self.object_path, joints=len(self.grasp) - ROOT_POSE)
 
 
 WANTED = keys(DexRecord)
-"""Fields that a record must have."""
 
 
 def load_dex_record(path: str | Path) -> DexRecord:
@@ -121,7 +122,7 @@ def load_dex_record(path: str | Path) -> DexRecord:
         InputError: The file cannot be read, or lacks a field.
     """
     place = path_of(path, "path")
-    data = read_bytes(place, MOST_BYTES)
+    data = read_bytes(place, MOST_RECORD_BYTES)
     with about(place):
         return _record(_unpickled(data))
 
@@ -248,11 +249,11 @@ def write_dex_record(record: DexRecord, path: str | Path) -> Path:
     return write_parts(path_of(path, "path"), [held.getvalue()])
 
 
-Row: TypeAlias = tuple[float, ...]
+InertialRow: TypeAlias = tuple[float, ...]
 
 
 LINKS = ("base", "proximal", "medial", "distal")
-ALLEGRO: tuple[Row, ...] = (
+ALLEGRO: tuple[InertialRow, ...] = (
     (351.4, -8.986, -3.957, -40.27, 447.7, 261.1, 283.1, 0.023, -1.612, -26.37),
     (7.232, -0.778, -0.01, 8.282, 0.748, 0.355, 0.707, 0.0, 0.032, -0.001),
     (27.28, 0.0, -0.091, 27.0, 11.86, 11.28, 2.266, 0.0, 0.0, 0.0),
@@ -266,7 +267,7 @@ ALLEGRO: tuple[Row, ...] = (
 """Palm, links of a finger, links of the thumb: mass [g], centre [mm] and inertia about it [kg mm^2]
 (xx, yy, zz, xy, xz, yz), in the link's frame."""
 LEAP_THUMB = ("mp", "base", "proximal", "distal")
-LEAP: tuple[Row, ...] = (
+LEAP: tuple[InertialRow, ...] = (
     (237.0, -49.54, -42.91, -10.23, 293.5, 192.2, 407.2, -35.62, -0.439, -6.247),
     (44.0, -22.52, 33.88, 16.36, 13.16, 10.3, 17.4, 4.266, 0.507, -0.162),
     (32.0, 7.5, -0.2, -11.0, 3.093, 4.373, 4.885, 0.0, 0.0, 0.0),
@@ -281,11 +282,10 @@ LEAP: tuple[Row, ...] = (
 
 
 def _inertials(
-    rows: tuple[Row, ...], fingers: tuple[str, ...], thumb: tuple[str, ...]
+    rows: tuple[InertialRow, ...], fingers: tuple[str, ...], thumb: tuple[str, ...]
 ) -> dict[str, dict[str, object]]:
-    """Return the inertials of a table by the names of links."""
     named = [f"{name}_{link}" for name in fingers for link in LINKS]
-    names = [PALM, *named, *(f"thumb_{link}" for link in thumb)]
+    names = [PALM_NAME, *named, *(f"thumb_{link}" for link in thumb)]
     every = [rows[0], *rows[1:5] * len(fingers), *rows[5:]]
     return {
         name: {"pos": 1e-3 * np.array(row[1:4]), "mass": 1e-3 * row[0],
@@ -306,7 +306,6 @@ HAND_FILES = {
         _inertials(LEAP, ("index", "middle", "ring"), LEAP_THUMB),
     ),
 }  # fmt: skip
-"""By the names of built-in hands."""
 HAND_FILES["allegro-urdf"] = HAND_FILES["allegro"]
 
 
@@ -326,12 +325,12 @@ def pose_of(seven: Array) -> Array:
     """Return the pose (4, 4) of a position and a quaternion (w, x, y, z) of any length."""
     found = np.eye(4)
     found[:3, 3] = seven[:3]
-    found[:3, :3] = rotations((seven[3:FREE] / np.linalg.norm(seven[3:FREE]))[None])[0]
+    found[:3, :3] = rotations((seven[3:ROOT_POSE] / np.linalg.norm(seven[3:ROOT_POSE]))[None])[0]
     return found
 
 
 def dex_record(
-    hand: Hand, reach: HandReach, object_path: str, *, push_n: float = PUSH_N,
+    hand: Hand, reach: HandReach, object_path: str, *, push_n: float = SQUEEZE_PUSH_N,
     servo_n_m_per_rad: float | None = None, gap_m: float | None = GAP_M,
 ) -> DexRecord:  # fmt: skip
     """Record where a hand stands in a grasp, for DexGraspBench.
@@ -379,7 +378,7 @@ def dex_record(
 
 def _opened_by(stance: Stance, opened: Array, gap_m: float) -> Array:
     """Open each finger on its way to a posture until its tip is a gap away along the normal."""
-    shares = np.linspace(0.0, 1.0, SHARES)
+    shares = np.linspace(0.0, 1.0, POSTURE_SHARES)
     ways = stance.joints + shares[:, None] * (opened - stance.joints)
     tips = places(stance.hand, ways, stance.palm_pose).tips
     gaps = [
@@ -387,7 +386,7 @@ def _opened_by(stance: Stance, opened: Array, gap_m: float) -> Array:
         for finger, contact in zip(stance.fingers, stance.contacts, strict=True)
     ]
     gap = min(gap_m, *(float(each[-1]) for each in gaps))
-    found, joints = opened.copy(), chains(stance.hand)
+    found, joints = opened.copy(), stance.hand.chains
     for finger, each in zip(stance.fingers, gaps, strict=True):
         share, own = float(np.interp(gap, each, shares)), list(joints[finger])
         found[own] = stance.joints[own] + share * (opened - stance.joints)[own]
@@ -425,7 +424,7 @@ def reach_of_record(
     value_of(Friction, friction, "friction")
     number(touch_m, "touch_m", ge=0.0, le=1.0)
     value_of(str, name, "name")
-    joints = record.grasp[FREE:]
+    joints = record.grasp[ROOT_POSE:]
     if len(joints) != len(hand.joints):
         raise InputError(
             f"record must have the {len(hand.joints)} joints of {hand.name}, got {len(joints)}; "
@@ -434,7 +433,7 @@ def reach_of_record(
     palm = _palms(record, hand)[1]
     found = partial(RecordedReach, hand.name, name, record=record)
     touching, contacts = _touched(hand, body, joints, palm, touch_m)
-    if len(touching) < FEWEST:
+    if len(touching) < FEWEST_TIPS:
         said = f"only {len(touching)} fingertips are within {1e3 * touch_m:g} mm of the surface"
         return found("not found", said, 1, 0.0)
     proof = force_closure(contacts, friction=friction)
@@ -443,7 +442,7 @@ def reach_of_record(
         return found("no closure", said, 1, 0.0, open_choices=(proof,))
     return found(
         "", "", 1, 0.0, np.array(touching), joints, palm, proof,
-        pregrasp=record.pregrasp[FREE:], used=np.arange(len(touching)),
+        pregrasp=record.pregrasp[ROOT_POSE:], used=np.arange(len(touching)),
     )  # fmt: skip
 
 
@@ -452,7 +451,8 @@ def recorded_postures(reach: RecordedReach, hand: Hand, servo_n_m_per_rad: float
     if reach.hand != hand.name:
         raise InputError(f"hand must be the recorded one, {reach.hand}, got {hand.name}")
     record = reach.record
-    joints = np.array([each[FREE:] for each in (record.pregrasp, record.grasp, record.squeeze)])
+    kept = record.pregrasp, record.grasp, record.squeeze
+    joints = np.array([each[ROOT_POSE:] for each in kept])
     palms = _palms(record, hand)
     torques = servo_n_m_per_rad * (joints[2] - joints[1])
     J = tip_jacobians(hand, joints[1], palms[1])[0].reshape(-1, len(torques))
@@ -470,7 +470,6 @@ def _palms(record: DexRecord, hand: Hand) -> Array:
 def _touched(
     hand: Hand, body: Polyhedron, joints: Array, palm: Array, touch_m: float
 ) -> tuple[list[int], tuple[Contact, ...]]:
-    """Find the fingers that touch, and where."""
     gaps, on_tips, on_object = tip_gaps(hand, body, joints, palm, np.arange(len(hand.fingers)))
     fingers, contacts = np.flatnonzero(np.abs(gaps) <= touch_m).tolist(), list[Contact]()
     for finger in fingers:

@@ -10,9 +10,11 @@ from typing import Annotated
 from tyro.conf import Positional, UseAppendAction, arg
 
 from grasp_core.declared import declared
-from grasp_core.kinds import Direction, HandClearance, Quantity, Seed, Starts, TorqueLimit
+from grasp_core.hands.settings import ReachSettings
+from grasp_core.kinds import Quantity, TorqueLimit
 from grasp_core.names import HANDS
 from sim_validate.commands.flags import (
+    BARE,
     AtFriction,
     FirstOnly,
     GraspId,
@@ -23,19 +25,19 @@ from sim_validate.commands.flags import (
 )
 from sim_validate.processes.workers import available_cores
 
-HandName = Annotated[str, arg(help=f"The hand: {', '.join(HANDS)}, or an MJCF or URDF file.")]
-Fingertips = Annotated[str, arg(metavar="NAME,NAME,...", help=(
+HandOrFile = Annotated[str, arg(help=f"The hand: {', '.join(HANDS)}, or an MJCF or URDF file.")]
+FingertipNames = Annotated[str, arg(metavar="NAME,NAME,...", help=(
     "For a hand from a file: names of sites, geoms or bodies that are fingertips, separated by "
     "commas."
 ))]  # fmt: skip
 
 
 @declared
-class Hand(Spoken):
+class ShownHand(Spoken):
     """Flags of the command `hand`."""
 
-    hand: Positional[HandName]
-    fingertips: Fingertips = ""
+    hand: Positional[HandOrFile]
+    fingertips: FingertipNames = ""
 
 
 @declared
@@ -43,18 +45,10 @@ class Reach(Spoken):
     """Flags of the command `reach`."""
 
     grasps: Positional[GraspsPath]
-    hand: HandName = "allegro"
-    fingertips: Fingertips = ""
+    hand: HandOrFile = "allegro"
+    fingertips: FingertipNames = ""
     grasp: GraspId = None
-    table: Annotated[Direction | None, arg(metavar="X Y Z")] = None
-    """Downward direction in the object's frame: the object lies on a table across it, and the hand
-    stays above the table."""
-    contacts_only: bool = False
-    """Touch the planned contacts themselves, not anywhere in the grasps' regions."""
-    clearance_m: HandClearance = 5e-4
-    """Least distance between all that must not touch [m]."""
-    starts: Starts = 100
-    """Largest number of starts for each grasp."""
+    pose: Annotated[ReachSettings, BARE] = field(default_factory=ReachSettings)
     torque_limit_n_m: TorqueLimit | None = None
     """Torque limit of every joint [N m], instead of those of the hand."""
     simulate: bool = False
@@ -70,8 +64,6 @@ class Reach(Spoken):
     """Folder for records of DexGraspBench, one for each grasp that is reached, and for the object
     as it wants it, if that is convex."""
     friction: AtFriction = None
-    seed: Seed = 0
-    """Seed of the postures from which the search starts."""
     limit: FirstOnly = None
     jobs: Jobs = field(default_factory=available_cores)
     out: Path | None = None

@@ -14,17 +14,16 @@ from pydantic import computed_field
 from grasp_core.arrays import UnitVector
 from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError
-from grasp_core.execution.carried_mass import HandPayload
 from grasp_core.figures import Shown
 from grasp_core.files.file_kinds import REACHES
 from grasp_core.hands.collisions import tip_distances
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach
-from grasp_core.kinds import FLAT, Direction, HandClearance, NotNegative, Seed, Starts
-from grasp_core.settings import Settings
+from grasp_core.hands.settings import ReachSettings
+from grasp_core.kinds import FLAT, NotNegative
 from sim_validate.execution.verdict import ExecutedGrasp
 from sim_validate.files.result_files import AboutGrasps
-from sim_validate.hands.trials import HandVerdict
+from sim_validate.hands.verdict import HandVerdict
 from sim_validate.settings import ExecutionSettings
 
 TOUCHING_M = 1e-4
@@ -32,24 +31,11 @@ TOUCHING_M = 1e-4
 
 
 @declared
-class ReachSettings(Settings):
-    """What is asked of a pose, as `reach_with` takes it."""
-
-    regions: bool = True
-    """Whether contacts may be anywhere in the grasp's regions, or must be the planned ones."""
-    table_down: Direction | None = None
-    """Downward direction in the object's frame, if the object lies on a table."""
-    clearance_m: HandClearance = 5e-4
-    """Least distance between all that must not touch [m]."""
-    starts: Starts = 100
-    """Largest number of starts for each choice of contacts."""
-    seed: Seed = 0
-    """Seed of the postures from which the search starts."""
-
-
-@declared
 class CarriedMass(Declared):
-    """The largest mass that a hand holds in any orientation, its links included."""
+    """The largest mass that a hand holds in any orientation, its links included.
+
+    The proofs are left out: `hand_payload` finds them again.
+    """
 
     lower_kg: NotNegative
     """Mass that is held in every orientation, with forces chosen anew for each [kg]."""
@@ -57,11 +43,6 @@ class CarriedMass(Declared):
     """Mass above which some orientation is not held [kg]."""
     weakest_gravity: UnitVector
     """Direction of gravity in which the hand lets go first, in the object's frame."""
-
-    @classmethod
-    def of(cls, found: HandPayload) -> "CarriedMass":
-        """Leave out the proofs, which `hand_payload` finds again."""
-        return cls(found.lower, found.upper, found.weakest)
 
 
 @declared

@@ -46,7 +46,8 @@ from sim_validate.engine.stepping import Bench, Motion, Told
 from sim_validate.engine.traces import Outcome, judge, rotation_angles
 from sim_validate.execution.execute import given_contacts
 from sim_validate.hands.dexgraspbench import RecordedReach, hand_file, recorded_postures
-from sim_validate.hands.trials import hand_setup, require_faithful_hands
+from sim_validate.hands.known_hand import KnownHand
+from sim_validate.hands.validate import hand_setup
 from sim_validate.processes.own_faults import OWN_FAULTS
 from sim_validate.protocols.published import PROTOCOLS, Passing, ProtocolRun, PublishedProtocol
 from sim_validate.protocols.verdict import Judgement, OurVerdict, RunVerdict
@@ -176,7 +177,7 @@ def _ours(
     if isinstance(reach, RecordedReach) and not reach.reached:
         return OurVerdict(False, False, 0.0, reach.explanation)
     checked(ClosureCase.of(setup, friction, body.radius))
-    require_faithful_hands(setup, friction)
+    checked(KnownHand.of(setup, friction))
     held = build_hand_scene(hand, body, reach, friction, physics=setup.physics)
     contacts = stance_of(hand, reach).contacts
     analysis = LoadPlanner(body, contacts, friction, setup, held.hand.motors)

@@ -19,7 +19,8 @@ from scenes.drawing.sheets import Sheet, svg_of
 from scenes.settings import FingerSettings
 from sim_validate.closure.replaying import WantedTrial, of_verdict, replayed
 from sim_validate.closure.verdict import Verdict, Verdicts
-from sim_validate.execution.execute import ExecutionJob, film, worth_seeing
+from sim_validate.execution.execute import ExecutionJob
+from sim_validate.execution.filming import film, worth_seeing
 from sim_validate.execution.verdict import Executions
 from sim_validate.files.results_folder import CLIP_FOLDER, GRASP_PAGES, PICTURE_FOLDER
 from sim_validate.report.charts import margin_panels, motion_panels, wrench_panels

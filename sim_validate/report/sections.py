@@ -3,7 +3,7 @@
 import math
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -165,13 +165,9 @@ def reach_commands(found: Findings, path: str) -> Sequence[str]:
     reaches = found.run.reaches
     if reaches is None or reaches.hand.name not in HANDS or found.reached is None:
         return []
-    asked, usual = reaches.asked, type(reaches.asked)()
     words = ["graspproof", "reach", path, "--hand", reaches.hand.name, "--grasp", found.grasp.id]
     words += ["--friction", repr(reaches.friction)]
-    numbers = replace(asked, regions=usual.regions, table_down=usual.table_down)
-    words += flags_from(_changed(numbers, usual), Reach)
-    words += [] if asked.table_down is None else ["--table", *map(repr, asked.table_down)]
-    words += [] if asked.regions else ["--contacts-only"]
+    words += flags_from(_changed(reaches.asked, type(reaches.asked)()), Reach)
     return [shlex.join(words)]
 
 

@@ -74,7 +74,8 @@ CASES = (
         "hand",
         (
             "plan box --limit 2 --jobs 1 --out .",
-            "reach grasps.json --hand leap --table 0 0 -1 --limit 1 --simulate --jobs 1 --out .",
+            "reach grasps.json --hand leap --table-down 0 0 -1 --limit 1 --simulate --jobs 1"
+            " --out .",
             "reach grasps.json --hand leap --mass-kg 0.05 --torque-limit-n-m 0.7 --limit 1"
             " --jobs 1 --out executed",
         ),

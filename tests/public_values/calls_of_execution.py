@@ -9,7 +9,7 @@ import grasp_core as gc
 import scenes
 import sim_validate as sv
 from grasp_core.quality.contact_forces import even_forces
-from sim_validate.hands.trials import cube, hinged_hand, stance
+from sim_validate.hands.known_hand import cube, hinged_hand, stance
 from tests.public_values.bad_values import (
     AT_LEAST_ONE,
     FRICTION,
@@ -161,8 +161,7 @@ CALLS = [
     }, {
         "grasp": SEVERAL | {"one": grasp().contacts[:1]},
         "friction": each_of(FRICTION, "zero"),
-        "settings": VALUE,
-        "mass_kg": optional(POSITIVE),
+        "settings": optional(VALUE),
         "physics": optional(VALUE) | {"other gravity": tilted()},
     }),
     Call("gc.hand_motors", lambda: {"hand": hinged_hand(), "reach": stance(0.5)}, {
@@ -178,19 +177,22 @@ CALLS = [
     Call("scenes.build_hand_scene", standing),
     Call("sv.hand_setup", dict),
     Call("sv.validate_hand", standing),
-    Call("sv.execute_hand", lambda: standing() | {"mass_kg": 0.1}, {
-        "settings": optional(VALUE),
-    }, succeeds_in="tests/sim_validate/hands/test_execute_hand.py"),
+    Call("sv.execute_hand", standing, {"settings": optional(VALUE)},
+         succeeds_in="tests/sim_validate/hands/test_execute.py"),
+    Call("sv.hand_execution_settings", dict, {"mass_kg": optional(POSITIVE)}),
     Call("gc.load_hand", lambda: {"name": "leap"}, {"name": WORD}),
     Call("gc.reach_with", reaching, {
+        "settings": optional(VALUE),
+    }, slow=True),
+    Call("gc.ReachSettings", dict, {
         "regions": SWITCH,
         "table_down": optional(array([0.0, 0.0, -1.0])) | {"zero": [0.0, 0.0, 0.0]},
         "clearance_m": NOT_NEGATIVE | {"large": 0.5},
         "starts": AT_LEAST_ONE | {"many": 10**6},
-    }, slow=True),
-    Call("scenes.load_hand", lambda: {"hand": "allegro"}, {
-        "hand": WORD, "fingertips": unless(SEVERAL, "text") | {"for a built-in hand": ["tip"]},
     }),
+    Call("scenes.hand_from_file", lambda: {"path": "no/such.xml", "fingertips": ("a", "b", "c")}, {
+        "path": PATH, "fingertips": unless(SEVERAL, "text"),
+    }, succeeds_in="tests/scenes/hand_files/test_building.py"),
     Call("sv.protocol_names", dict),
     Call("sv.protocol", lambda: {"name": "dexonomy"}, {"name": NAME}),
     Call("sv.judge_by", lambda: {

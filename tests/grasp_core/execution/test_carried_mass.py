@@ -8,7 +8,7 @@ import pytest
 import grasp_core as gc
 from grasp_core.execution import carried_mass as carried_mass_module
 from grasp_core.execution.carried_mass import (
-    GAP,
+    MASS_GAP,
     CarryingHand,
     HandPayload,
     ball_in,
@@ -74,7 +74,7 @@ def test_opposed_fingers_whose_links_hang_alike_hold_what_the_closed_form_says(m
     found, exact = carried_mass(pushing_hand(weight, mu)), closed_form(weight, mu)
     assert found.lower <= exact * (1.0 + PROGRAM)
     assert found.upper >= exact * (1.0 - PROGRAM)
-    assert found.upper <= found.lower * (1.0 + GAP) * (1.0 + PROGRAM)
+    assert found.upper <= found.lower * (1.0 + MASS_GAP) * (1.0 + PROGRAM)
     assert found.verify()
     lowered = 4.0 * mu * (TORQUE - weight) / LEVER_M / np.sqrt(1.0 + 4.0 * mu**2) / G
     assert found.upper >= lowered * (1.0 - PROGRAM)
@@ -86,7 +86,7 @@ def test_masses_are_proved_and_true_by_definition():
         assert found.verify()
         assert hand_payloads.payload(found)
         assert hand_payloads.held(hand, found.weakest) <= found.upper * (1.0 + PROGRAM)
-        assert 0.0 < found.lower <= found.upper <= found.lower * (1.0 + GAP) * (1.0 + PROGRAM)
+        assert 0.0 < found.lower <= found.upper <= found.lower * (1.0 + MASS_GAP) * (1.0 + PROGRAM)
 
 
 @pytest.mark.parametrize("mu", [0.0, 1e-9])
@@ -105,7 +105,7 @@ def test_links_that_nearly_use_up_the_motors_leave_little_and_it_is_proved():
         found, exact = carried_mass(pushing_hand(weight, 0.4)), closed_form(weight, 0.4)
         assert found.lower <= exact * (1.0 + PROGRAM / left)
         assert found.upper >= exact * (1.0 - PROGRAM / left)
-        assert found.upper <= found.lower * (1.0 + GAP) * (1.0 + PROGRAM)
+        assert found.upper <= found.lower * (1.0 + MASS_GAP) * (1.0 + PROGRAM)
         assert found.verify()
 
 
@@ -165,8 +165,10 @@ def test_a_mass_that_is_none_needs_no_forces_and_a_smaller_claim_is_one_too():
 def test_a_hand_that_is_held_back_by_motors_holds_as_much_whatever_its_largest_push(push):
     """The mass meets the closed form above at any push, as slacks follow the real forces."""
     found, exact = carried_mass(pushing_hand(0.05, 0.4, push)), closed_form(0.05, 0.4)
-    assert exact * (1.0 - GAP - PROGRAM) <= found.lower <= exact * (1.0 + PROGRAM)
-    assert exact * (1.0 - PROGRAM) <= found.upper <= found.lower * (1.0 + GAP) * (1.0 + PROGRAM)
+    assert exact * (1.0 - MASS_GAP - PROGRAM) <= found.lower <= exact * (1.0 + PROGRAM)
+    assert (
+        exact * (1.0 - PROGRAM) <= found.upper <= found.lower * (1.0 + MASS_GAP) * (1.0 + PROGRAM)
+    )
     assert found.verify()
     for change in (
         {"upper": found.upper * (1.0 - 1e-6)}, {"forces": (1.0 + 1e-5) * found.forces},
@@ -227,7 +229,7 @@ def test_pushes_that_motors_feel_are_bounded_by_them_to_a_factor_of_two():
 def test_a_search_out_of_rays_ends_after_a_few_steps_with_a_smaller_mass(monkeypatch):
     hand = next(iter(hands()))
     fine = carried_mass(hand)
-    monkeypatch.setattr(carried_mass_module, "RAYS", 6)
+    monkeypatch.setattr(carried_mass_module, "MOST_RAYS", 6)
     found = carried_mass(hand, 1e-4)
     assert found.verify()
     assert 0.1 * fine.lower < found.lower < 0.99 * fine.lower

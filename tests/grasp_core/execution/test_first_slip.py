@@ -6,7 +6,7 @@ import pytest
 import grasp_core as gc
 from grasp_core.closure.contacts import grasp_map, normal_and_tangential
 from grasp_core.execution import first_slip as module
-from grasp_core.execution.first_slip import Held
+from grasp_core.execution.first_slip import Equilibrium
 from tests.grasp_core.execution import held
 from tests.grasp_core.execution.held import loads_of, opposed_grip, planned_grips
 from tests.tampering.changes import forged
@@ -111,7 +111,7 @@ def test_a_load_that_only_presses_fingers_on_ends_in_no_slip(monkeypatch):
     for model in ("finite", "linear"):
         found = gc.first_slip(cupped(1e8), ACROSS, model=model)
         assert (found.multiple, found.event, found.contact) == (np.inf, "none", -1)
-    monkeypatch.setattr(module, "MOST_STEPS", 100)
+    monkeypatch.setattr(module, "MOST_LOAD_STEPS", 100)
     with pytest.raises(gc.SolverError, match="load of first slip was not met"):
         gc.first_slip(cupped(2e3), ACROSS)
 
@@ -123,7 +123,7 @@ def test_a_grip_that_no_finger_leaves_gives_way_where_its_stiffness_ends():
     assert (found.event, found.contact) == ("unstable", -1)
     there = replace(grip, arms=found.arms, normals=found.normals, squeeze=found.forces)
     assert there.least_stiffness == pytest.approx(0.0, abs=0.02 * grip.least_stiffness)
-    rest = Held(grip, grip, np.zeros(3), np.eye(3))
+    rest = Equilibrium(grip, grip, np.zeros(3), np.eye(3))
     assert rest.under(0.99 * found.multiple * load).grip.stable
     with pytest.raises(gc.SolverError, match="no equilibrium of the loaded grip"):
         rest.under(1.01 * found.multiple * load)

@@ -3,13 +3,13 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.closure.contacts import grasp_map
-from grasp_core.execution.first_slip import Held
+from grasp_core.execution.first_slip import Equilibrium
 from tests.grasp_core.execution.held import box, opposed, opposed_grip, planned_grips, pressed
 
 
 def moved(grip, motion):
     """The grip once its object has moved from rest, there and back."""
-    rest = Held(grip, grip, np.zeros(3), np.eye(3))
+    rest = Equilibrium(grip, grip, np.zeros(3), np.eye(3))
     return [rest.stepped(sign * motion).grip for sign in (1.0, -1.0)]
 
 

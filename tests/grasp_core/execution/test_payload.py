@@ -4,8 +4,12 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.execution.carried_mass import GAP
-from tests.grasp_core.execution.held import bodies_and_grasps, box, opposed
+from grasp_core.execution.carried_mass import MASS_GAP
+from tests.grasp_core.execution.held import (
+    bodies_and_grasps,
+    box,
+    opposed,
+)
 from tests.grasp_core.execution.jointed import hand_of, pushing
 from tests.tampering import hand_payloads
 from tests.tampering.changes import forged
@@ -22,7 +26,7 @@ def test_payloads_are_proved_and_true_by_definition(torque):
         assert found.verify()
         assert hand_payloads.payload_of_contacts(found)
         assert found.mass_kg <= found.free.upper  # as tips of no radius do not roll
-        assert found.free.upper <= found.free.lower * (1.0 + GAP) * (1.0 + 1e-6)
+        assert found.free.upper <= found.free.lower * (1.0 + MASS_GAP) * (1.0 + 1e-6)
         if motors:
             free = gc.payload(body, grasp, 0.5, **given)
             assert found.free.upper < 0.9 * free.free.lower

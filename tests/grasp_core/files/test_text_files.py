@@ -35,7 +35,7 @@ def test_a_pointer_of_git_lfs_is_called_what_it_is_by_every_reader(ending, tmp_p
     path.write_text(POINTER)
     read = {
         "json": gc.load_grasps, "npy": load_dex_record,
-        "xml": partial(scenes.load_hand, fingertips=("a", "b", "c")),
+        "xml": partial(scenes.hand_from_file, fingertips=("a", "b", "c")),
         "npz": lambda path: read_arrays(path, ()),
     }.get(ending, gc.load_polyhedron)  # fmt: skip
     with pytest.raises(InputError, match=r"pointer of Git LFS.*`git lfs pull`") as caught:

@@ -30,7 +30,7 @@ FALSE = {
 def coupled(tmp_path_factory):
     """A gripper whose fingers curl as they bend."""
     path = three_fingers_file(tmp_path_factory.mktemp("hand"))
-    return replace(scenes.load_hand(path, THREE_TIPS), couplings=CURLS)
+    return replace(scenes.hand_from_file(path, THREE_TIPS), couplings=CURLS)
 
 
 @pytest.fixture(scope="module")

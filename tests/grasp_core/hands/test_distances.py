@@ -10,19 +10,19 @@ import trimesh
 import grasp_core as gc
 import scenes
 from grasp_core.compiled import compiled
-from grasp_core.hands.collisions import KERNEL as HANDS
+from grasp_core.hands.collisions import COLLISIONS as HANDS
 from grasp_core.hands.collisions import surface_tree
 from grasp_core.hands.hand_arrays import hand_arrays
 from tests.judges import random_rotation
 
-KERNEL = "grasp_core.hands.distances_kernel"
+COLLISIONS = "grasp_core.hands.distances_kernel"
 EXACT = 1e-7
 """Accuracy of the program that judges: its own tolerance is 1e-15 on squares."""
 
 
 def test_hulls_are_as_far_apart_as_the_program_says():
     """Also hulls that are flat, alike or a point, and such that overlap."""
-    kernel, rng, seen = compiled(KERNEL), np.random.default_rng(20), 0
+    kernel, rng, seen = compiled(COLLISIONS), np.random.default_rng(20), 0
     for n in range(150):
         A = rng.normal(size=(int(rng.integers(1, 30)), 3))
         B = rng.normal(size=(int(rng.integers(1, 9)), 3)) * 10.0 ** rng.uniform(-3, 0)
@@ -46,7 +46,7 @@ def test_hulls_are_as_far_apart_as_the_program_says():
 
 
 def test_a_hull_is_as_far_from_a_surface_as_from_its_nearest_triangle():
-    kernel, rng = compiled(KERNEL), np.random.default_rng(21)
+    kernel, rng = compiled(COLLISIONS), np.random.default_rng(21)
     body = scenes.example_object("l-bracket")
     tree = surface_tree(body)
     for _ in range(20):
@@ -145,7 +145,7 @@ def is_inside(place, body):
 @pytest.mark.parametrize("name", ["cross", pytest.param("mug", marks=pytest.mark.slow)])
 def test_nearest_points_are_those_of_trimesh(name):
     body, rng = scenes.example_object(name), np.random.default_rng(6)
-    tree, kernel, near = surface_tree(body), compiled(KERNEL), np.empty(3)
+    tree, kernel, near = surface_tree(body), compiled(COLLISIONS), np.empty(3)
     places = rng.uniform(-0.1, 0.1, (200, 3))
     mesh = trimesh.Trimesh(body.vertices, body.triangles, process=False)
     _, true, _ = trimesh.proximity.closest_point_naive(mesh, places)

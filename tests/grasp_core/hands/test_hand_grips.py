@@ -6,7 +6,6 @@ import pytest
 import grasp_core as gc
 from grasp_core.execution.grips import Grip
 from grasp_core.hands.hand_arrays import places
-from grasp_core.hands.hand_motors import chains
 from grasp_core.hands.reach import stance_of
 from tests.sim_validate.hands.executing import standing
 from tests.tampering.changes import forged
@@ -19,7 +18,7 @@ HANDS = ("leap", pytest.param("allegro", marks=pytest.mark.slow))
 def torques(hand, reach, k, joints, point_normal, force):
     """Return l_a . f of a finger at joint angles, with the ball touching along a normal, (m,)."""
     stance = stance_of(hand, reach)
-    rho, own = stance.tip_radii[k], list(chains(hand)[stance.fingers[k]])
+    rho, own = stance.tip_radii[k], list(hand.chains[stance.fingers[k]])
     found = places(stance.hand, joints, stance.palm_pose)
     point = found.tips[0, stance.fingers[k]] + rho * point_normal
     arms = point - found.link_positions[0, own]
@@ -35,7 +34,7 @@ def test_changes_of_force_balance_servos_that_follow_the_object(name):
     for motion in rng.normal(size=(5, 6)) * np.repeat([1.0, 1.0 / grip.size], 3):
         d, t = motion[:3], motion[3:]
         for k, finger in enumerate(stance.fingers):
-            own, n, f = list(chains(hand)[finger]), grip.normals[k], grip.squeeze[k]
+            own, n, f = list(hand.chains[finger]), grip.normals[k], grip.squeeze[k]
             turned = n + SMALL * np.cross(t, n)
             changed = f + SMALL * grip.force_changes[k] @ motion
             rest = torques(hand, reach, k, stance.joints, n, f)

@@ -5,7 +5,7 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.errors import InputError
-from grasp_core.execution.carried_mass import GAP
+from grasp_core.execution.carried_mass import MASS_GAP
 from tests.grasp_core.execution.held import directions
 from tests.grasp_core.hands.gripping import FRICTION, reaches, scaled
 
@@ -43,7 +43,7 @@ def test_the_mass_is_the_least_of_all_orientations_and_found_within_the_gap():
     rng, hand = np.random.default_rng(0), leap()
     mass = carried(hand, body, reach)
     assert mass.verify()
-    assert mass.upper <= mass.lower * (1.0 + GAP) * (1.0 + PROGRAM)
+    assert mass.upper <= mass.lower * (1.0 + MASS_GAP) * (1.0 + PROGRAM)
     least = min(held(hand, body, reach, way) for way in directions(12, rng))
     assert least >= mass.lower * (1.0 - PROGRAM)
     weakest = held(hand, body, reach, mass.weakest)

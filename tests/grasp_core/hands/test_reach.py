@@ -8,10 +8,10 @@ import pytest
 import trimesh
 
 import grasp_core as gc
-from grasp_core.hands.collisions import FAR, clearances, tip_distances, tip_gaps
+from grasp_core.hands.collisions import FAR_M, clearances, tip_distances, tip_gaps
 from grasp_core.hands.hand import Hand, HandFinger
 from grasp_core.hands.hand_arrays import places
-from grasp_core.hands.pose_search import TOUCHING, Asked, starts
+from grasp_core.hands.pose_search import TIP_TOUCHING, AskedPose, starts
 from tests.grasp_core.hands.gripping import FRICTION, finger, grasps, plain_hand, reaches, scaled
 
 CASES = [
@@ -63,7 +63,7 @@ def test_most_grasps_are_reached_and_each_claim_holds(hand, name, radius):
         for f, contact in zip(each.fingers, each.contacts, strict=True):
             corners, rounding = placed_tip(held, each, f)
             ahead = (corners - contact.position) @ contact.normal
-            assert ahead.max() == pytest.approx(-rounding, abs=TOUCHING)
+            assert ahead.max() == pytest.approx(-rounding, abs=TIP_TOUCHING)
             front = corners[ahead >= ahead.max() - 1e-6] - contact.position
             middle = front - ahead.max() * contact.normal
             # the contact is ahead of the farthest corner, or between several
@@ -100,11 +100,11 @@ def test_points_strewn_over_links_are_outside_the_object(hand, name, radius):
             near, away, triangles = trimesh.proximity.closest_point_naive(mesh, points)
             outward = np.einsum("ij,ij->i", points - near, mesh.face_normals[triangles])
             signed = np.where(outward >= 0.0, away, -away)
-            assert signed.min() >= thick - TOUCHING - 1e-9
+            assert signed.min() >= thick - TIP_TOUCHING - 1e-9
         measured = clearances(held, body, each.joints, each.palm_pose, each.fingers)
         assert measured.itself >= 5e-4
         assert measured.object >= 0.0
-        assert abs(measured.tips) <= TOUCHING
+        assert abs(measured.tips) <= TIP_TOUCHING
         seen += 1
     assert seen == 1
 
@@ -194,18 +194,18 @@ def test_a_block_that_is_moved_into_the_object_is_said_to_be_deep_in_it():
             continue
         seen += 1
         gaps, _, touched = tip_gaps(hand, body, each.joints, each.palm_pose, each.fingers)
-        assert gaps == pytest.approx(np.zeros(4), abs=TOUCHING)
+        assert gaps == pytest.approx(np.zeros(4), abs=TIP_TOUCHING)
         assert touched == pytest.approx(np.array([c.position for c in each.contacts]))
         for k, contact in enumerate(each.contacts):
             pose = each.palm_pose.copy()
             pose[:3, 3] += 1e-3 * contact.normal
             inside, _, _ = tip_gaps(hand, body, each.joints, pose, each.fingers)
             # a corner beside an edge is less deep below the other face
-            assert -1e-3 - 2.0 * TOUCHING <= inside[k] <= -4e-4
+            assert -1e-3 - 2.0 * TIP_TOUCHING <= inside[k] <= -4e-4
             moved = clearances(hand, body, each.joints, pose, each.fingers)
             assert moved.tips < -5e-5
             off = tip_distances(hand, each.joints, each.palm_pose, each.fingers, touched)
-            assert off == pytest.approx(np.zeros(4), abs=TOUCHING)
+            assert off == pytest.approx(np.zeros(4), abs=TIP_TOUCHING)
     assert seen >= 3
 
 
@@ -216,7 +216,7 @@ def test_fingers_of_one_hand_that_overlap_are_told():
     pose[:3, 3] = 1.0
     none = np.empty(0, np.int64)
     # the boxes of neighbours are 40 - 12 mm apart, their balls 40 - 16: beyond what is measured
-    assert clearances(hand, body, np.zeros(8), pose, none).itself == FAR
+    assert clearances(hand, body, np.zeros(8), pose, none).itself == FAR_M
     leaning = replace(
         hand,
         fingers=(
@@ -236,7 +236,7 @@ def test_a_search_starts_alike_where_contacts_differ_by_rounding():
     hand, rng = gc.load_hand("leap"), np.random.default_rng(0)
     for grasp in grasps("dodecahedron", 0.035):
         moved = grasp.positions * (1.0 + 1e-15 * rng.standard_normal((4, 3)))
-        asked = Asked(hand, None, grasp, 0.5, None, -np.inf, 0.0, True, 0, 20)
+        asked = AskedPose(hand, None, grasp, 0.5, gc.ReachSettings(starts=20))
         ways = [starts(asked, points, grasp.normals) for points in (grasp.positions, moved)]
         for (fingers, one), (same, other) in zip(*ways, strict=True):
             np.testing.assert_array_equal(fingers, same)

@@ -13,9 +13,10 @@ from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.hands.reach import HandReach
 from scenes.drawing.hands import posed_hand
 from sim_validate.files.result_files import AboutObject
-from sim_validate.hands.reaches import ReachedGrasp, Reaches, ReachSettings
+from sim_validate.hands.reaches import ReachedGrasp, Reaches
 
 FRICTION, CLEARANCE = 0.5, 5e-4
+ASKED = gc.ReachSettings(regions=False, table_down=(0.0, 0.0, -1.0))
 GRASP = "c-0-1-4-5"
 FINGERS = ("thumb", "ring", "first", "middle")
 JOINTS = (
@@ -92,4 +93,4 @@ def reaches_text():
         for each in plan
     )
     about = AboutObject.of(body)
-    return Reaches(about, FRICTION, hand, ReachSettings(), None, found, complete=True).text()
+    return Reaches(about, FRICTION, hand, ASKED, None, found, complete=True).text()

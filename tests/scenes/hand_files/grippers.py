@@ -69,4 +69,4 @@ class Beside:
 
 
 def loaded(folder, text, tips, name="hand.urdf"):
-    return scenes.load_hand(written(folder, text, name), tips)
+    return scenes.hand_from_file(written(folder, text, name), tips)

@@ -7,7 +7,7 @@ import grasp_core as gc
 import scenes
 from grasp_core.errors import InputError
 from sim_validate.closure.validate import Agenda
-from sim_validate.hands.trials import validate_hand
+from sim_validate.hands.validate import validate_hand
 from tests.grasp_core.hands.gripping import FRICTION, grasps, scaled
 from tests.scenes.hand_files.grippers import CAPSULE, gripper, loaded, written
 from tests.scenes.hand_files.test_published_kinds import BALL_KG, TIPS, robot
@@ -65,13 +65,13 @@ def test_a_missing_moment_is_none(tmp_path):
 )
 def test_bodies_of_mjcf_may_be_frames_as_well(change, kept, tmp_path):
     text = gripper().replace('<joint name="c', change + '<joint name="c')
-    hand = scenes.load_hand(written(tmp_path, text), SITES)
+    hand = scenes.hand_from_file(written(tmp_path, text), SITES)
     assert [finger.links[-1].mass_kg for finger in hand.fingers] == [kept] * 4
 
 
 def test_shapes_without_a_mass_are_ends_of_chains(tmp_path):
     light = CAPSULE[1] + ' mass="0"'
-    hand = scenes.load_hand(written(tmp_path, gripper((CAPSULE[0], light))), SITES)
+    hand = scenes.hand_from_file(written(tmp_path, gripper((CAPSULE[0], light))), SITES)
     assert [finger.links[-1].mass_kg for finger in hand.fingers] == [0.0] * 4
 
 
@@ -82,7 +82,7 @@ def test_a_negative_mass_is_refused(tmp_path):
 
 def test_a_hand_without_masses_is_simulated(tmp_path):
     text = gripper((CAPSULE[0], CAPSULE[1] + ' mass="0"'))
-    hand = scenes.load_hand(written(tmp_path, text), SITES).with_torque_limits(0.4, "a test")
+    hand = scenes.hand_from_file(written(tmp_path, text), SITES).with_torque_limits(0.4, "a test")
     tried = (
         (body, gc.reach_with(hand, body, grasp, FRICTION))
         for name in ("octahedron", "dodecahedron", "wedge")

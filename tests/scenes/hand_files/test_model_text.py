@@ -18,7 +18,7 @@ BODIES = WHOLE[WHOLE.index("<worldbody>") + 11 : WHOLE.index("</worldbody>")]
 
 
 def palm_of(path):
-    return sorted(scenes.load_hand(path, SITES).palm[0].half_sizes)
+    return sorted(scenes.hand_from_file(path, SITES).palm[0].half_sizes)
 
 
 def box_at(path):
@@ -101,8 +101,8 @@ def test_included_files_are_read_with_their_settings_and_files(tmp_path):
 def test_bodies_are_included_where_they_are_named(tmp_path):
     written(tmp_path / "common", f"<mujocoinclude>{BODIES}</mujocoinclude>", "bodies.xml")
     text = '<mujoco><worldbody><include file="../common/bodies.xml"/></worldbody></mujoco>'
-    found = scenes.load_hand(written(tmp_path / "xml", text), SITES)
-    assert found == scenes.load_hand(written(tmp_path / "whole", WHOLE), SITES)
+    found = scenes.hand_from_file(written(tmp_path / "xml", text), SITES)
+    assert found == scenes.hand_from_file(written(tmp_path / "whole", WHOLE), SITES)
 
 
 def test_a_mesh_beside_an_included_file_is_found(tmp_path):
@@ -141,7 +141,7 @@ def test_includes_that_are_not_read_are_refused(case, tmp_path):
     written(tmp_path, "<x/>", "secret.xml")
     text = including(*files).replace('type="mesh" mesh="palm"', CYLINDER)
     with pytest.raises(InputError, match=said):
-        scenes.load_hand(written(folder, text), SITES)
+        scenes.hand_from_file(written(folder, text), SITES)
 
 
 def test_urdf_has_no_includes(tmp_path):
@@ -153,5 +153,5 @@ def test_stated_folders_alone_open_nothing(tmp_path):
     box_at(tmp_path / "other" / "palm.obj")
     text = including(more=f'<compiler meshdir="{tmp_path / "other"}"/>{ASSET}')
     with pytest.raises(InputError, match="not in the folder"):
-        scenes.load_hand(written(tmp_path / "deep" / "xml", text), SITES)
+        scenes.hand_from_file(written(tmp_path / "deep" / "xml", text), SITES)
     assert np.isfinite(palm_of(written(tmp_path / "xml", text))).all()

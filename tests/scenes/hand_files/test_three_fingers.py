@@ -9,7 +9,7 @@ import pytest
 import grasp_core as gc
 import scenes
 from grasp_core.hands.collisions import overlapping_pairs
-from grasp_core.hands.pose_search import TOUCHING
+from grasp_core.hands.pose_search import TIP_TOUCHING
 from tests.grasp_core.hands.gripping import FRICTION, grasps, scaled
 from tests.scenes.hand_files.grippers import Beside
 from tests.three_fingers import THREE_TIPS, three_fingers_file
@@ -28,7 +28,7 @@ def file(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def hand(file):
-    return scenes.load_hand(file, THREE_TIPS)
+    return scenes.hand_from_file(file, THREE_TIPS)
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +68,7 @@ def test_mujoco_has_fingertips_on_the_object_and_all_else_apart(file, hand, reac
         tips = {model.geom(name).id for name in THREE_TIPS}
         for geom in set(range(model.ngeom)) - {solid}:
             if geom in tips:
-                assert simulated.apart(geom) == pytest.approx(0.0, abs=TOUCHING + MUJOCO_SLACK)
+                assert simulated.apart(geom) == pytest.approx(0.0, abs=TIP_TOUCHING + MUJOCO_SLACK)
             else:
                 assert simulated.apart(geom) >= CLEARANCE - MUJOCO_SLACK
         for i, j in combinations(sorted(set(range(model.ngeom)) - {solid}), 2):
@@ -97,7 +97,7 @@ def test_fingers_that_meet_in_the_middle_of_their_ranges_may_not_overlap(tmp_pat
     text = Path(three_fingers_file(tmp_path)).read_text()
     closed = tmp_path / "closed.xml"
     closed.write_text(text.replace('range="-70 70"', 'range="-140 0"'))
-    hand = scenes.load_hand(closed, THREE_TIPS)
+    hand = scenes.hand_from_file(closed, THREE_TIPS)
     owner = {link.name: finger.name for finger in hand.fingers for link in finger.links}
     middle = overlapping_pairs(hand, 0.5 * hand.ranges.sum(axis=1))
     across = [pair for pair in middle if len({owner.get(name, "palm") for name in pair}) == 2]

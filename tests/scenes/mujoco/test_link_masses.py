@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from grasp_core.hands.hand import PALM, Fingertip, Hand, HandFinger, Joint, Link, LinkShape
+from grasp_core.hands.hand import PALM_NAME, Fingertip, Hand, HandFinger, Joint, Link, LinkShape
 from scenes.mujoco.chains import hand_inertials
 
 BOX = LinkShape([0.01, 0.0, 0.02], np.eye(3), [0.01, 0.02, 0.03], 0.0)
@@ -21,7 +21,7 @@ def hand(*shapes, **known):
 
 
 def test_a_box_has_the_mass_and_inertia_of_water():
-    found = hand_inertials(hand(CAPSULE))[PALM]
+    found = hand_inertials(hand(CAPSULE))[PALM_NAME]
     sides = 2.0 * BOX.half_sizes
     mass = 1000.0 * sides.prod()
     squares = sides**2 / 12.0

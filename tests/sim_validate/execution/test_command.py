@@ -111,10 +111,10 @@ def test_a_control_that_holds_is_a_fault_of_the_simulator(capsys, monkeypatch):
 
 
 def test_what_was_done_is_kept_where_the_simulator_fails(capsys, monkeypatch):
-    def failing(job):
+    def failing(job, refused):
         if job.grasp.id == IDS[1]:
             raise UnfaithfulError("knock +x: a number is not finite")
-        return executed_grasp(job)
+        return executed_grasp(job, refused)
 
     monkeypatch.setattr(jobs, "executed_grasp", failing)
     words = ["execute", "grasps.json", "--mass-kg", "0.3", *QUICK, "--out", "."]

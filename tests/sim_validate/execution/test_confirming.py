@@ -9,14 +9,9 @@ import grasp_core as gc
 import scenes
 import sim_validate as sv
 from sim_validate.engine.stepping import Health
-from sim_validate.execution import execute
-from sim_validate.execution.execute import (
-    FINE_S,
-    Fingertips,
-    confirming_bench,
-    run_again,
-    run_trials,
-)
+from sim_validate.execution import confirming
+from sim_validate.execution.confirming import FINE_S, confirming_bench, run_again, run_trials
+from sim_validate.execution.execute import SpringFingers
 from sim_validate.execution.predictions import HeldDynamics
 from sim_validate.execution.simulate import HeldBench, outcome
 from sim_validate.execution.trials import trials_of
@@ -37,7 +32,7 @@ def bar():
 
 def test_a_loss_of_a_step_that_is_too_long_does_not_count(bar, monkeypatch):
     found = {trial.name: trial for trial in sv.execute(*bar, 0.4, LIGHT).trials}
-    monkeypatch.setattr(execute, "confirming_bench", lambda _: None)
+    monkeypatch.setattr(confirming, "confirming_bench", lambda _: None)
     once = {trial.name: trial for trial in sv.execute(*bar, 0.4, LIGHT).trials}
     lost = {name for name, trial in once.items() if not trial.survived}
     assert "stop -y" in lost
@@ -57,7 +52,7 @@ def test_the_motion_of_a_kept_object_is_that_of_short_steps_where_it_nears_a_lim
     settings = replace(LIGHT, max_mm=0.7)
     found = {trial.name: trial for trial in sv.execute(*bar, 0.4, settings).trials}
     usual, half = found["stop +z"].step_s, 0.5 * settings.most_m
-    monkeypatch.setattr(execute, "_is_near", lambda *_: False)
+    monkeypatch.setattr(confirming, "_is_near", lambda *_: False)
     once = {trial.name: trial for trial in sv.execute(*bar, 0.4, settings).trials}
     near = [
         name for name, trial in once.items()
@@ -78,7 +73,7 @@ def test_the_motion_of_a_kept_object_is_that_of_short_steps_where_it_nears_a_lim
 def trials_on_a_bench(settings):
     """The box on its bench, the trials of some settings, their motions, and the frictions."""
     body, grasp = planned("box")
-    fingers = Fingertips(body, grasp.contacts, 0.5)
+    fingers = SpringFingers(body, grasp.contacts, 0.5)
     best = fingers.squeeze(settings)
     scene = fingers.scene(settings, best)
     bench = HeldBench(scene)
@@ -110,14 +105,14 @@ def test_one_trial_that_diverges_loses_one_trial(monkeypatch):
     body, grasp = planned("box")
     settings = sv.ExecutionSettings(0.1, trials=("weight", "knock"))
     plain = sv.execute(body, grasp, 0.5, settings)
-    judged = execute._judged
+    judged = confirming._judged
 
     def diverging(trial, motion, *more):
         if trial.name == "knock -y":
             motion = replace(motion, health=Health(finite=False))
         return judged(trial, motion, *more)
 
-    monkeypatch.setattr(execute, "_judged", diverging)
+    monkeypatch.setattr(confirming, "_judged", diverging)
     found = sv.execute(body, grasp, 0.5, settings)
     assert len(found.trials) == 7
     for one, other in zip(found.trials, plain.trials, strict=True):

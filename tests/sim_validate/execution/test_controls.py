@@ -8,7 +8,7 @@ import pytest
 import grasp_core as gc
 import sim_validate as sv
 from scenes.example_objects import example_object
-from sim_validate.execution.execute import Fingertips
+from sim_validate.execution.execute import SpringFingers
 from sim_validate.execution.trials import SURE, slipping_load, weaker_grips
 
 FRICTION = 0.5
@@ -18,7 +18,7 @@ SETTINGS = sv.ExecutionSettings(mass_kg=0.55, trials=("weight",))
 def squeezed(name):
     body = example_object(name)
     for grasp in gc.plan(body, FRICTION, limit=4).grasps:
-        fingers = Fingertips(body, grasp.contacts, FRICTION)
+        fingers = SpringFingers(body, grasp.contacts, FRICTION)
         best = fingers.squeeze(SETTINGS)
         yield best, fingers.scene(SETTINGS, best).layout
 
@@ -60,7 +60,7 @@ def test_the_slipping_load_slips_also_where_a_push_reaches_its_limit_first():
     grasps = gc.plan(body, FRICTION, families=("pencil",), limit=8).grasps
     limited = 0
     for grasp in grasps:
-        fingers = Fingertips(body, grasp.contacts, FRICTION)
+        fingers = SpringFingers(body, grasp.contacts, FRICTION)
         best = fingers.squeeze(SETTINGS)
         load = slipping_load(best)
         slip = gc.first_slip(best.grip, load, model="linear")

@@ -6,10 +6,10 @@ import pytest
 
 import grasp_core as gc
 import sim_validate as sv
-from sim_validate.execution.execute import Fingertips
-from sim_validate.execution.predictions import CLEAR, NoSqueezeError
+from sim_validate.execution.execute import SpringFingers
+from sim_validate.execution.predictions import NO_LOSS, NoSqueezeError
 from sim_validate.execution.verdict import losses_in_words
-from sim_validate.hands.trials import hand_execution_settings
+from sim_validate.hands.execute import hand_execution_settings
 from tests.grasp_core.execution.held import box
 from tests.grasp_core.hands.gripping import FRICTION, scaled
 from tests.sim_validate.execution.held_rigs import G, opposed, planned
@@ -52,7 +52,7 @@ def test_a_grasp_survives_with_what_is_said_to_be_enough(name):
     assert again.survived, losses_in_words(again)
     assert again.enough is None
     assert again.load_multiple == enough.load_multiple
-    assert again.least_predicted_loss == enough.predicted_loss >= CLEAR
+    assert again.least_predicted_loss == enough.predicted_loss >= NO_LOSS
     assert enough.stiffness_n_per_m >= settings.tip_stiffness_n_per_m
     assert (enough.push_n < settings.push_n) == (name in {"soft", "unstable"})
 
@@ -69,7 +69,9 @@ def test_the_push_is_the_least_for_loads_that_are_a_formula():
     assert least.verify()
     assert least.max_push_n <= enough.push_n <= 1.011 * least.max_push_n
     assert enough.load_multiple == pytest.approx(1.6, rel=0.012)
-    less = Fingertips(box(), opposed(), 0.5).squeeze(replace(settings, push_n=0.98 * enough.push_n))
+    less = SpringFingers(box(), opposed(), 0.5).squeeze(
+        replace(settings, push_n=0.98 * enough.push_n)
+    )
     assert less.upper < 1.6
 
 
@@ -80,7 +82,7 @@ def test_the_stiffness_is_the_least_that_keeps_the_object_in_its_place():
     assert enough.stiffness_n_per_m > 1.5 * settings.tip_stiffness_n_per_m
     softer = enough.stiffness_n_per_m / 1.2
     less = replace(settings, push_n=enough.push_n, tip_stiffness_n_per_m=softer)
-    assert sv.execute(body, grasp, 0.5, less).least_predicted_loss < CLEAR
+    assert sv.execute(body, grasp, 0.5, less).least_predicted_loss < NO_LOSS
 
 
 def test_where_no_push_is_enough_a_proof_says_so():

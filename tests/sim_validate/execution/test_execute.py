@@ -9,7 +9,7 @@ import grasp_core as gc
 import sim_validate as sv
 from grasp_core.objects.on_faces import edge_distance
 from scenes.example_objects import example_object
-from sim_validate.execution.execute import ExecutionJob, Fingertips, executed
+from sim_validate.execution.execute import ExecutionJob, SpringFingers, executed
 from sim_validate.execution.trials import Skipped
 from sim_validate.execution.verdict import edges_in_words
 from sim_validate.settings import TRIAL_KINDS
@@ -130,7 +130,7 @@ def test_a_curved_surface_is_there_as_far_as_fingertips_come_and_no_farther():
     body = dented_ball()
     grasp = gc.plan(body, 0.5, limit=1).grasps[0]
     settings = sv.ExecutionSettings(mass_kg=0.1, trials=("weight", "misplaced"), off_mm=1.0)
-    fingers = Fingertips(body, grasp.contacts, 0.5)
+    fingers = SpringFingers(body, grasp.contacts, 0.5)
     best = fingers.squeeze(settings)
     near = fingers.scene(settings, best).layout
     all_of_it = replace(settings, max_deg=80.0)

@@ -7,8 +7,9 @@ import pytest
 
 import grasp_core as gc
 from scenes.drawing.clips import GraphicsError
-from sim_validate.execution import execute as jobs
-from sim_validate.execution.execute import FRAMES, ExecutionJob, film, worth_seeing
+from sim_validate.execution import filming
+from sim_validate.execution.execute import ExecutionJob
+from sim_validate.execution.filming import FRAMES, film, worth_seeing
 from sim_validate.settings import ExecutionSettings
 from tests.scenes.drawing.whole import frames_of
 from tests.sim_validate.execution.executed import execution, trial
@@ -69,7 +70,7 @@ def test_what_is_filmed_is_the_motion_in_its_true_size_and_slowed_down(held, mon
         asked.update(joints=joints, caption=caption, **more)
         return path
 
-    monkeypatch.setattr(jobs, "write_held_clip", write)
+    monkeypatch.setattr(filming, "write_held_clip", write)
     film(ExecutionJob(*held, FRICTION, SETTINGS), "shake along z", held[0].name)
     count = len(asked["joints"])
     assert count >= FRAMES

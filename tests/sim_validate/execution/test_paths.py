@@ -110,4 +110,4 @@ def test_gravity_is_turned_through_all_directions(hertz):
     assert np.linalg.norm(ways, axis=1) == pytest.approx(1.0)
     many = np.random.default_rng(0).normal(size=(2000, 3))
     many /= np.linalg.norm(many, axis=1)[:, None]
-    assert np.arccos((many @ ways.T).max(axis=1).clip(max=1.0)).max() < 0.505 * paths.SPACING
+    assert np.arccos((many @ ways.T).max(axis=1).clip(max=1.0)).max() < 0.505 * paths.TURN_GAP

@@ -14,7 +14,7 @@ import scenes
 from grasp_core.closure.contacts import cross_matrix
 from scenes.settings import SAMPLE_S
 from sim_validate.execution import paths
-from sim_validate.execution.paths import Table, idle
+from sim_validate.execution.paths import TablePlane, idle
 from sim_validate.execution.predictions import HeldDynamics
 from sim_validate.execution.trials import Trial
 from sim_validate.settings import ExecutionSettings
@@ -150,7 +150,7 @@ def test_nothing_slips_where_nothing_acts():
 def test_a_table_carries_the_weight_until_the_lift():
     """With a share of zero throughout, the weight is never felt; with shares it is."""
     drive = replace(idle(100), gravity=np.tile(DOWN, (100, 1)))
-    table = Table(np.array([0.0, 0.0, -0.03]), np.array([0.0, 0.0, 1.0]))
+    table = TablePlane(np.array([0.0, 0.0, -0.03]), np.array([0.0, 0.0, 1.0]))
     resting, hanging = predicted_slips(box_dynamics(), [replace(drive, table=table), drive])
     assert resting == np.inf
     assert hanging < 4 * 0.5 * 5.0 / (MASS * G)

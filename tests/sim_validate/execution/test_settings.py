@@ -17,7 +17,7 @@ from scenes.settings import SAMPLE_S
 from sim_validate.commands.config_file import flags_from
 from sim_validate.commands.simulation_flags import ExecuteFlags
 from sim_validate.execution.paths import stop
-from sim_validate.hands.trials import hand_execution_settings
+from sim_validate.hands.execute import hand_execution_settings
 from sim_validate.settings import TRIAL_KINDS, TrialKind
 
 TABLE = {

@@ -9,7 +9,7 @@ import grasp_core as gc
 import scenes
 from scenes.settings import SAMPLE_S
 from sim_validate.execution import paths
-from sim_validate.execution.paths import Table
+from sim_validate.execution.paths import TablePlane
 from sim_validate.execution.simulate import HeldBench
 from tests.grasp_core.execution.held import box
 from tests.sim_validate.execution.held_rigs import MASS, G, box_bench, box_grip, box_scene
@@ -29,7 +29,7 @@ def test_the_squeeze_comes_and_leaves_the_object_where_it_is():
 def test_the_palm_follows_its_path_and_takes_the_object_along():
     drive, begun = paths.lift(UP, 0.2, 0.6)
     height = box().center_of_mass[2] - box().vertices[:, 2].min()
-    (motion,) = box_bench().run([replace(drive, table=Table(-height * UP, UP))])
+    (motion,) = box_bench().run([replace(drive, table=TablePlane(-height * UP, UP))])
     assert not motion.health.fault
     speeds = SAMPLE_S * np.cumsum(drive.accelerations[:, 2])
     path = SAMPLE_S * np.cumsum(speeds - 0.5 * SAMPLE_S * drive.accelerations[:, 2])

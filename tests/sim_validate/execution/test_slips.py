@@ -9,10 +9,10 @@ from scipy.spatial.transform import Rotation
 from scenes.mujoco.held_scene import hinged
 from scenes.mujoco.mjcf_text import rotations
 from sim_validate.engine.stepping import Health
-from sim_validate.execution.paths import Table, idle
+from sim_validate.execution.paths import TablePlane, idle
 from sim_validate.execution.simulate import (
-    SLID,
-    TOUCHED,
+    SLIPPED_BY,
+    TOUCH_SLIDE,
     HeldMotion,
     _first_slip,
     outcome,
@@ -90,7 +90,7 @@ def test_rolling_without_sliding_is_no_slip(axis):
     if abs(unit @ [1, 0, 0]) < 1e-12:  # otherwise the point of contact twists, which is no slip
         assert np.abs(across).max() < 1e-3 * layout.radius_m
     motion = motion_of(turned=turns.as_quat(scalar_first=True), centers=centers)
-    assert motion.slides().max() < 1e-3 * SLID * layout.radius_m
+    assert motion.slides().max() < 1e-3 * SLIPPED_BY * layout.radius_m
     found = judged(motion)
     assert found.turn_rad == pytest.approx(0.3, rel=1e-9)
     assert not found.slipped
@@ -153,7 +153,7 @@ def taken_off(samples, by):
     world[samples, 0, 2] = 0.5 * 5.0
     centers = np.tile(layout.tip_centers, (COUNT, 1, 1))
     centers[samples[0] :, 0, 1] += by * layout.radius_m
-    table = Table(np.array([0, 0, -0.03]), np.array([0, 0, 1.0]))
+    table = TablePlane(np.array([0, 0, -0.03]), np.array([0, 0, 1.0]))
     shares = np.minimum(np.linspace(0.0, 4.0, COUNT), 1.0)
     drive = replace(idle(COUNT), shares=shares, table=table)
     return motion_of(centers=centers, forces=np.einsum("kij,nki->nkj", layout.axes, world)), drive
@@ -161,14 +161,14 @@ def taken_off(samples, by):
 
 @pytest.mark.parametrize("samples", [[40], [40, 41, 42]])
 def test_a_contact_that_touches_its_cone_at_a_take_off_and_holds_has_not_slipped(samples):
-    found = judged(*taken_off(samples, 0.5 * TOUCHED))
+    found = judged(*taken_off(samples, 0.5 * TOUCH_SLIDE))
     assert not found.slipped
     assert found.first_slip == pytest.approx(10.0, rel=1e-6)
 
 
 def test_a_contact_that_slides_on_its_cone_at_a_take_off_has_slipped():
-    found = judged(*taken_off([40, 41], 2.0 * TOUCHED))
-    assert found.slip_m < SLID * box_scene().layout.radius_m
+    found = judged(*taken_off([40, 41], 2.0 * TOUCH_SLIDE))
+    assert found.slip_m < SLIPPED_BY * box_scene().layout.radius_m
     assert found.slipped
     assert 0.38 < found.first_slip <= 40 * 4 / 399
 
@@ -176,13 +176,13 @@ def test_a_contact_that_slides_on_its_cone_at_a_take_off_has_slipped():
 def test_a_contact_that_is_on_its_cone_when_the_full_load_has_come_has_slipped():
     """However little it slides, and whether it came to its cone before or after."""
     for samples in ([*range(60, 110)], [150]):
-        found = judged(*taken_off(samples, 0.5 * TOUCHED))
+        found = judged(*taken_off(samples, 0.5 * TOUCH_SLIDE))
         assert found.slipped
         assert found.first_slip == pytest.approx(min(samples[0] * 4 / 399, 1.0), abs=0.02)
 
 
 def test_only_a_take_off_may_touch_a_cone():
-    motion, drive = taken_off([40], 0.5 * TOUCHED)
+    motion, drive = taken_off([40], 0.5 * TOUCH_SLIDE)
     assert judged(motion, replace(drive, table=None)).slipped
 
 

@@ -4,7 +4,7 @@ from functools import lru_cache
 
 import grasp_core as gc
 from scenes.mujoco.hand_scenes import held_hand_scene
-from sim_validate.hands.trials import HandHolder, hand_execution_settings
+from sim_validate.hands.execute import HandHolder, hand_execution_settings
 from tests.grasp_core.hands.gripping import FRICTION, reaches, scaled
 
 OBJECT, RADIUS, MASS, TORQUE = "dodecahedron", 0.035, 0.07, 0.35

@@ -12,7 +12,7 @@ from grasp_core.errors import InputError
 from grasp_core.hands.hand_arrays import places
 from grasp_core.hands.reach import stance_of
 from sim_validate.hands.dexgraspbench import (
-    FREE,
+    ROOT_POSE,
     DexRecord,
     dex_record,
     hand_file,
@@ -76,7 +76,7 @@ def test_the_squeeze_turns_joints_by_the_torque_of_the_forces_over_the_stiffness
     usual = dex_record(model, reach, "o")
     stiff = dex_record(model, reach, "o", servo_n_m_per_rad=10.0)
     strong = dex_record(model, reach, "o", push_n=10.0)
-    turns = [each.squeeze[FREE:] - each.grasp[FREE:] for each in (usual, stiff, strong)]
+    turns = [each.squeeze[ROOT_POSE:] - each.grasp[ROOT_POSE:] for each in (usual, stiff, strong)]
     assert np.abs(turns[0]).max() > 0.01
     assert turns[1] == pytest.approx(0.5 * turns[0], abs=1e-9)
     assert turns[2] == pytest.approx(2.0 * turns[0], abs=1e-9)
@@ -95,13 +95,13 @@ def test_fingertips_of_a_record_meet_the_object_at_one_moment(hand, gap):
     (reach, *_) = [each for each in reached(hand) if each.pregrasp is not None]
     record = dex_record(model, reach, "o", gap_m=gap)
     palm = pose_of(record.grasp) @ hand_file(model).root
-    ways = np.linspace(record.pregrasp, record.grasp, 3)[:, FREE:]
+    ways = np.linspace(record.pregrasp, record.grasp, 3)[:, ROOT_POSE:]
     tips = places(stance_of(model, reach).hand, ways, palm).tips  # balls in place of blocks
     for contact, finger in zip(reach.contacts, reach.fingers, strict=True):
         away = (tips[2, finger] - tips[:2, finger]) @ contact.normal
         assert away == pytest.approx([gap, 0.5 * gap], abs=0.1 * gap)
     whole = dex_record(model, reach, "o", gap_m=None)
-    assert whole.pregrasp[FREE:] == pytest.approx(reach.pregrasp)
+    assert whole.pregrasp[ROOT_POSE:] == pytest.approx(reach.pregrasp)
 
 
 def test_a_record_away_from_the_object_touches_nothing_and_an_open_one_is_refuted():

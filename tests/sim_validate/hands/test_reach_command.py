@@ -77,7 +77,7 @@ def test_what_cannot_be_reached_or_simulated_is_refused(bracket_plan, tmp_path, 
     coupled = coupled_file(tmp_path)
     others = "left_curl follows left_bend, right_curl follows right_bend"
     for flags, *said in (
-        (["--hand", "nose"], "hand must be allegro, allegro-urdf, leap"),
+        (["--hand", "nose"], "built-in hands are allegro, allegro-urdf, leap"),
         (["--simulate"], "give one for all joints with --torque-limit-n-m"),
         (["--mass-kg", "0.1"], "--mass-kg needs a torque limit for each joint"),
         ([*coupled, "--simulate"], "--simulate needs a hand with a motor at each joint", others),

@@ -12,7 +12,7 @@ from grasp_core.errors import InputError
 from scenes.mujoco.mjcf_text import quaternion
 from scenes.mujoco.published_tests import TestedObject
 from sim_validate.hands.dexgraspbench import (
-    FREE,
+    ROOT_POSE,
     dex_record,
     hand_file,
     pose_of,
@@ -59,7 +59,7 @@ def scene(changed, servo=5.0):
 
 
 def with_open_finger():
-    own = slice(FREE + 4 * OPEN, FREE + 4 * OPEN + 4)
+    own = slice(ROOT_POSE + 4 * OPEN, ROOT_POSE + 4 * OPEN + 4)
     grasp, squeeze = np.array(record().grasp), np.array(record().squeeze)
     grasp[own] = squeeze[own] = record().pregrasp[own]
     return replace(record(), grasp=grasp, squeeze=squeeze)
@@ -112,8 +112,8 @@ def test_forces_are_along_the_axes_of_the_records_world():
     turn[:2, :2] = [[0.0, -1.0], [1.0, 0.0]]
 
     def moved(seven):
-        pose = turn @ pose_of(seven[:FREE])
-        return np.concatenate([pose[:3, 3], quaternion(pose[:3, :3]), seven[FREE:]])
+        pose = turn @ pose_of(seven[:ROOT_POSE])
+        return np.concatenate([pose[:3, 3], quaternion(pose[:3, :3]), seven[ROOT_POSE:]])
 
     parts = ("object_pose", "pregrasp", "grasp", "squeeze")
     turned = replace(record(), **{name: moved(getattr(record(), name)) for name in parts})
@@ -129,7 +129,11 @@ def test_a_run_is_what_a_plain_loop_of_steps_gives():
     run = timeline(TEST, made, TEST.runs[2])
     (model, data), farthest = compiled(made, 0), 0.0
     for sample, (told, wrench) in enumerate(zip(run.commands, run.wrenches, strict=True)):
-        data.mocap_pos[0], data.mocap_quat[0], data.ctrl[:] = told[:3], told[3:FREE], told[FREE:]
+        data.mocap_pos[0], data.mocap_quat[0], data.ctrl[:] = (
+            told[:3],
+            told[3:ROOT_POSE],
+            told[ROOT_POSE:],
+        )
         data.xfrc_applied[model.body("object").id] = wrench
         mujoco.mj_step(model, data, nstep=PUBLISHED_STEPS)
         if sample in run.looks:

@@ -11,6 +11,7 @@ from sim_validate.commands.exit_codes import Exit
 from sim_validate.main import main
 from sim_validate.report.report import write_report
 from tests.scenes.drawing.standing import (
+    ASKED,
     FRICTION,
     GRASP,
     POSITIONS,
@@ -86,7 +87,7 @@ def test_the_command_of_the_page_seeks_the_pose_again(report, asked):
     assert words[:4] == ["reach", "grasps.json", "--hand", "allegro"]
     assert main(words) == Exit.GOOD
     (command,) = asked
-    assert (command.grasp, command.friction, command.starts) == (GRASP, FRICTION, 100)
+    assert (command.grasp, command.friction, command.pose) == (GRASP, FRICTION, ASKED)
 
 
 def doubled(record):

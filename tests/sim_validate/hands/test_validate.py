@@ -10,7 +10,8 @@ import sim_validate as sv
 from grasp_core.errors import InputError, UnfaithfulError
 from scenes.mujoco_options import PhysicsSettings
 from sim_validate.closure.verdict import AGREEMENT
-from sim_validate.hands.trials import KnownHand, hand_setup
+from sim_validate.hands.known_hand import KnownHand
+from sim_validate.hands.validate import hand_setup
 from tests.grasp_core.hands.gripping import FRICTION, reaches, scaled
 from tests.marks import more
 from tests.sim_validate.hands.executing import OBJECT, RADIUS, TORQUE, stood
@@ -79,7 +80,7 @@ def test_unfaithful_settings_are_refused(change):
 
 def test_what_cannot_be_tested_is_refused():
     body, (reach, held) = scaled(OBJECT, RADIUS), stood("allegro")
-    with pytest.raises(InputError, match=r"are not in force closure at 0\.001"):
+    with pytest.raises(InputError, match=r"not in force closure at friction 0\.001"):
         sv.validate_hand(held, body, reach, 0.001)
     soft = replace(hand_setup(), physics=PhysicsSettings(torsion_m=0.005))
     with pytest.raises(InputError, match="torsion_m must be zero for a hand"):

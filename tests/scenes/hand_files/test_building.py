@@ -18,7 +18,7 @@ BOX = ("box", 'pos="0 0 0.02" size="0.008 0.009 0.02"')
 @pytest.mark.parametrize("tips", ["s{}", "p{}", "d{}"])
 def test_fingertips_are_named_by_site_geom_or_body(tips, tmp_path):
     path = written(tmp_path, gripper())
-    hand = scenes.load_hand(path, [tips.format(n) for n in range(4)])
+    hand = scenes.hand_from_file(path, [tips.format(n) for n in range(4)])
     assert len(hand.joints) == 12
     assert [f.tip.radius for f in hand.fingers] == pytest.approx([0.007] * 4)
     assert hand.joints[1].lowest == pytest.approx(-0.5 * np.pi)
@@ -48,7 +48,8 @@ def test_a_fingertip_that_is_no_ball_is_free_where_it_is_said_to_be(kind, tmp_pa
     """MuJoCo has the file's own geoms: none is in the object by more than 0.1 mm, and boxes and
     meshes touch it."""
     path = written(tmp_path, gripper(BLOCKS[kind], extra=WEDGE))
-    hand, body, seen = scenes.load_hand(path, [f"p{n}" for n in range(4)]), scaled("box", 0.02), 0
+    hand = scenes.hand_from_file(path, [f"p{n}" for n in range(4)])
+    body, seen = scaled("box", 0.02), 0
     simulated = Beside(path, body)
     for grasp in grasps("box", 0.02, 12):
         found = gc.reach_with(hand, body, grasp, FRICTION)
@@ -60,12 +61,6 @@ def test_a_fingertip_that_is_no_ball_is_free_where_it_is_said_to_be(kind, tmp_pa
         assert min(gaps) > -1e-4
         assert kind == "cylinder" or max(gaps) < 3e-4
     assert seen >= 2
-
-
-def test_built_in_names_give_the_tables():
-    assert scenes.load_hand("allegro") == gc.load_hand("allegro")
-    with pytest.raises(InputError, match="has its own fingertips"):
-        scenes.load_hand("leap", ["tip"])
 
 
 BAD = {
@@ -98,7 +93,7 @@ def test_what_is_no_hand_is_refused_with_what_to_do(case, tmp_path):
     text, tips, said = BAD[case]
     (tmp_path / "secret.stl").write_bytes(b"x")
     with pytest.raises(InputError, match=said):
-        scenes.load_hand(written(tmp_path / "hands", text), tips)
+        scenes.hand_from_file(written(tmp_path / "hands", text), tips)
 
 
 def test_meshes_in_the_folder_of_the_compiler_are_read_and_taken_as_boxes(tmp_path):
@@ -106,5 +101,5 @@ def test_meshes_in_the_folder_of_the_compiler_are_read_and_taken_as_boxes(tmp_pa
     extra = '<compiler meshdir="meshes"/><asset><mesh file="palm.obj"/></asset>'
     cylinder = 'type="cylinder" size="0.05 0.005"'
     text = gripper(extra=extra).replace(cylinder, 'type="mesh" mesh="palm"')
-    hand = scenes.load_hand(written(tmp_path, text), ("s0", "s1", "s2", "s3"))
+    hand = scenes.hand_from_file(written(tmp_path, text), ("s0", "s1", "s2", "s3"))
     assert sorted(hand.palm[0].half_sizes) == pytest.approx([0.01, 0.02, 0.03], abs=1e-6)
