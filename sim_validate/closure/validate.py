@@ -80,8 +80,8 @@ def validate(
         UnfaithfulError: The simulator fails its checks with these settings.
     """
     agenda, setup = asked_for(agenda, setup)
-    setup = setup.for_body(body)
     proved = proved_closed(body, grasp, friction, setup)
+    setup = setup.for_body(body)
     gate = checked_for(body, friction, agenda, setup)
     return tested(body, proved, friction, gate, agenda, setup)
 
