@@ -18,7 +18,6 @@ from grasp_core.errors import SolverError as SolverError
 from grasp_core.errors import UndecidedError as UndecidedError
 from grasp_core.errors import UnfaithfulError as UnfaithfulError
 from grasp_core.execution.best_squeeze import best_squeeze as best_squeeze
-from grasp_core.execution.carried_mass import FreeMass as FreeMass
 from grasp_core.execution.carried_mass import HandPayload as HandPayload
 from grasp_core.execution.carried_mass import Payload as Payload
 from grasp_core.execution.carried_mass import payload as payload

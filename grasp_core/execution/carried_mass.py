@@ -420,10 +420,6 @@ def _nothing_held(hand: CarryingHand, weakest: Ray) -> HandPayload:
     return _held(hand, 0.0, weakest, np.zeros((0, 3)), forces, none)
 
 
-FreeMass = HandPayload
-"""Bounds of the mass that forces chosen anew for each orientation hold."""
-
-
 @declared
 class Payload(Declared):
     """The largest mass held in every orientation, with forces chosen beforehand and chosen anew."""

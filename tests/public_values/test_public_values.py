@@ -18,7 +18,7 @@ CALLS = [*calls_of_grasp_core.CALLS, *calls_of_execution.CALLS, *calls_of_simula
 BY_NAME = {call.name: call for call in CALLS}
 MADE_BY_FUNCTIONS = {
     "gc": "BestGrasp BestSqueeze CarriedContact CarriedGrasp CertifiedRegions ClosureCertificate "
-    "FaceChange FerrariCanny FirstSlip FreeMass FrictionInterval GraspFigures Grip Hand "
+    "FaceChange FerrariCanny FirstSlip FrictionInterval GraspFigures Grip Hand "
     "HandPayload HandReach Improvement Payload PlacementProbability Plan QualityCeiling Transfer "
     "WrenchLimit",
     "scenes": "HandScene HeldScene Layout Scene Sheet Turntable",
