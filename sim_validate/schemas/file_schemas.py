@@ -43,7 +43,7 @@ class FileKind(NamedTuple):
 
 
 FILE_KINDS: Mapping[str, FileKind] = {
-    "grasps": FileKind(files.GRASPS, "grasp_core.planning.grasps_json:GraspsFile"),
+    "grasps": FileKind(files.GRASPS, "grasp_core.planning.grasps_json:SavedGrasps"),
     "best": FileKind(files.BEST, "sim_validate.planning.best:Best"),
     "transfer": FileKind(files.TRANSFER, "sim_validate.planning.transfer:TransferFile"),
     "verdicts": FileKind(files.VERDICTS, "sim_validate.closure.verdict:Verdicts"),

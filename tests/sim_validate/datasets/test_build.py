@@ -154,7 +154,7 @@ def test_an_unfaithful_simulator_ends_a_build_before_it_begins(tmp_path, monkeyp
     def fail(*_):
         raise gc.UnfaithfulError("the simulator is off")
 
-    monkeypatch.setattr(build_module, "require_faithful", fail)
+    monkeypatch.setattr(build_module, "checked", fail)
     engine = Here()
     with pytest.raises(gc.UnfaithfulError):
         build(CONFIG, tmp_path / "ds", engine, silent)
