@@ -38,7 +38,7 @@ Loop = TypeVar("Loop", bound=Callable[..., Any])
 
 NUMBA_FAILS = (ImportError, RuntimeError, OSError, ValueError)
 """What numba raises when it is imported with settings that it refuses, or cannot be."""
-HASH_DIGITS = 16
+COPY_HASH_DIGITS = 16
 IMPORTED = re.compile(r"^from ((?:grasp_core|scenes)(?:\.\w+)+) import", re.MULTILINE)
 """Pattern of the imports in a kernel's text."""
 COMPILERS = ("numba", "llvmlite")
@@ -172,7 +172,7 @@ def _stamp(module: str, path: Path) -> str:
                 if name.endswith(KERNEL_ENDING):
                     ahead.append(name)
     parts = (*sorted(texts.items()), sys.implementation.cache_tag, *map(version, COMPILERS))
-    return hashlib.sha256(repr(parts).encode()).hexdigest()[:HASH_DIGITS]
+    return hashlib.sha256(repr(parts).encode()).hexdigest()[:COPY_HASH_DIGITS]
 
 
 @cache

@@ -35,7 +35,7 @@ from sim_validate.report.command import shown_report
 
 RESULTS = Path("graspproof-out")
 """Folder in which each object gets its own folder of results if --out is not given."""
-HASH_DIGITS = 8
+FOLDER_HASH_DIGITS = 8
 """Number of hash digits in a folder's name that tell apart objects with similar names."""
 NAME_LETTERS = 60
 """Largest number of characters of an object's name in the name of its folder; with four bytes each
@@ -124,4 +124,4 @@ def _reported(folder: Path | None, jobs: int, reporter: Reporter) -> Generator[N
 def _folder_name(body: Polyhedron) -> str:
     """Turn an object's name into a safe folder name; a name that changes gets a hash added."""
     plain = re.sub(r"[^\w-]+", "_", body.name)[:NAME_LETTERS] or "object"
-    return plain if plain == body.name else f"{plain}-{body.content_sha256[:HASH_DIGITS]}"
+    return plain if plain == body.name else f"{plain}-{body.content_sha256[:FOLDER_HASH_DIGITS]}"

@@ -42,7 +42,7 @@ from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
 from grasp_core.solvers.ties import first_best, nearest_optimum
 from grasp_core.values import Contact, Grasp
 
-MOST_PROGRAMS = 60
+MOST_SQUEEZE_PROGRAMS = 60
 """Most programs that are solved; ten are usual."""
 SQUEEZE_GAP = 1e-4
 """Gap between scale and upper bound, relative to it, at which no more rounds follow: the nearest of
@@ -111,7 +111,7 @@ def searched(
     survival = Survival.of(start, loads, motors)
     cuts = Cuts.first(len(survival.friction))
     best: _Round | None = None
-    for _ in range(MOST_PROGRAMS):
+    for _ in range(MOST_SQUEEZE_PROGRAMS):
         found = _solved(start, loads, survival, cuts, most, motors)
         if best is None or found.gap < best.gap:
             best = found

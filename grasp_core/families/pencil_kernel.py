@@ -55,7 +55,7 @@ from grasp_core.families.placements import LEAST_RADIUS, Fingers, Placed
 from grasp_core.geometry.vectors_kernel import angle_between, dotted, focus_direction
 from grasp_core.values import FINGERS
 
-K, INNER_RADIUS, PENCIL_RADII, PENCIL_VARIABLES = 3, 4, 5, 9
+PENCIL_K, INNER_RADIUS, PENCIL_RADII, PENCIL_VARIABLES = 3, 4, 5, 9
 """Indices of k, R and the first radius among (x0, k, R, r_11 .. r_22), and their number."""
 ONE = 4
 """Place of the constant in functions of (x0, k)."""
@@ -75,7 +75,7 @@ def pencil_program(fingers: Fingers, signs: Array) -> Program:
     A, b = program.A, program.b
     s, y = _centers(fingers, u, signs)
     # the foci are 2 k apart
-    A[0, K], b[0] = -2.0, -LEAST_RADIUS
+    A[0, PENCIL_K], b[0] = -2.0, -LEAST_RADIUS
     row = _disc_rows(fingers, (s, y), A, b)
     if near:
         row = _near_rows(fingers, u, s, (A, b), row)
@@ -109,7 +109,7 @@ def _heights(d: Array, turned: Array, o: Array, found: Array) -> None:
     """Write the height d.(c - o) of a focus c = x0 + k (+-u) as a function of (x0, k, 1)."""
     for j in range(3):
         found[j] = d[j]
-    found[K], found[ONE] = dotted(d, turned), -dotted(d, o)
+    found[PENCIL_K], found[ONE] = dotted(d, turned), -dotted(d, o)
 
 
 @loop("numpy", once=True)
@@ -144,7 +144,7 @@ def _near_rows(fingers: Fingers, u: Array, s: Array, rows: tuple[Array, Array], 
         toward = (1.0 if i < FINGERS // 2 else -1.0) * dotted(fingers.axes[i], u)
         for j in range(ONE):
             A[row, j] = -toward * s[i, j]
-        A[row, K] += 2.0
+        A[row, PENCIL_K] += 2.0
         A[row, PENCIL_RADII + i] = np.hypot(dotted(T[:, 0], u), dotted(T[:, 1], u))
         # (6) takes eps |n.u| from the limit
         off = fingers.depths[i] * abs(dotted(fingers.normals[i], u))
@@ -168,5 +168,5 @@ def take_pencil(fingers: Fingers, a: int, signs: Array, x: Array, placed: Placed
             placed.positions[a, i, j] = fingers.origins[i, j] + T[0] * first + T[1] * second
     for pair in range(2):
         for j in range(3):
-            placed.foci[a, pair, j] = x[j] + signs[2 * pair] * x[K] * u[j]
+            placed.foci[a, pair, j] = x[j] + signs[2 * pair] * x[PENCIL_K] * u[j]
     balance(fingers.axes, fingers.normals, placed.forces[a])

@@ -75,7 +75,7 @@ REGULUS_INSET = 1e-3
 """Least distance of a contact from the edges of its face, in object radii."""
 LEAST_PASS = 0.01
 """Least distance l_i, along N_i, at which a line passes the focus line, in object radii."""
-K, P, X, Z, T, REGULUS_VARIABLES = 3, 4, 5, 7, 9, 10
+REGULUS_K, P, X, Z, T, REGULUS_VARIABLES = 3, 4, 5, 7, 9, 10
 """Indices of k, p, x_1, z_1 and t among the variables, and their number."""
 ANGLE_SHARES = (0.5, 0.2, 0.8)
 """Shares of the interval (3) at which each slope's angle is tried."""
@@ -283,7 +283,7 @@ def _take(
         line, n = _line(frames, slopes, finger), fingers.normals[finger]
         contact, way = placed.positions[a, finger], ways[finger]
         for d in range(3):
-            passing = x[d] + x[K] * line.k[d] + x[P] * line.p[d]
+            passing = x[d] + x[REGULUS_K] * line.k[d] + x[P] * line.p[d]
             way[d] = x[X + line.pair] * line.x[d] + x[Z + line.pair] * line.z[d]
             contact[d] = passing - way[d]
             placed.foci[a, line.pair, d] += 0.5 * passing
@@ -398,6 +398,9 @@ def _add(line: _Line, d: Array, shares: tuple[float, float], rows: LpRows, row: 
     passing, force = shares
     for j in range(3):
         rows.At[j, row] = passing * d[j]
-    rows.At[K, row], rows.At[P, row] = passing * dotted(d, line.k), passing * dotted(d, line.p)
+    rows.At[REGULUS_K, row], rows.At[P, row] = (
+        passing * dotted(d, line.k),
+        passing * dotted(d, line.p),
+    )
     rows.At[X + line.pair, row] = force * dotted(d, line.x)
     rows.At[Z + line.pair, row] = force * dotted(d, line.z)

@@ -23,7 +23,7 @@ MOST_CORNERS_TRIED = 100
 """Largest number of corners that are tried: the bound of the loop, which ends after ten or so."""
 CLOSE = 1e-13
 """Share of a squared distance by which a corner must be nearer to the origin to count."""
-MOST_WAITING = 64
+TREE_DEPTH = 64
 """Places on the stack of a walk through the tree; a tree of 2^32 triangles needs fewer."""
 
 
@@ -185,7 +185,7 @@ def hull_surface(
     hull: Array, within: float, tree: SurfaceTree, near: Array, other: Array
 ) -> float:  # fmt: skip
     """Return the distance of a hull, (m, 3), from a surface: zero in it, inf if not within."""
-    stack, gaps = np.empty(MOST_WAITING, np.int64), np.empty(MOST_WAITING)
+    stack, gaps = np.empty(TREE_DEPTH, np.int64), np.empty(TREE_DEPTH)
     depth, gap2 = 1, np.empty(2)
     best, found, p, s, middle = within, np.inf, np.empty(3), np.empty(3), np.empty((1, 3))
     stack[0], gaps[0] = 0, 0.0
@@ -218,7 +218,7 @@ def hull_surface(
 @loop()
 def nearest(p: Array, within: float, tree: SurfaceTree, near: Array) -> int:
     """Fill in the surface's point nearest to p; return its triangle, or -1 if not within."""
-    stack, gaps, found, depth = np.empty(MOST_WAITING, np.int64), np.empty(MOST_WAITING), -1, 1
+    stack, gaps, found, depth = np.empty(TREE_DEPTH, np.int64), np.empty(TREE_DEPTH), -1, 1
     best, at, gap2, weights = within * within, np.empty(3), np.empty(2), np.empty(2)
     stack[0], gaps[0] = 0, 0.0
     while depth > 0:

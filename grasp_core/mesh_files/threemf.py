@@ -55,7 +55,7 @@ PARENTS = {
 SHAPING = {"object", "components", "component", "mesh", "vertices", "triangles", "build", "item"}
 """Elements in which one of an extension would change the shape."""
 FOREIGN = "of an extension"
-DEEPEST_ELEMENT, MOST_NODES = 64, 10_000
+DEEPEST_ELEMENT, MOST_ITEMS = 64, 10_000
 """Largest depth of elements, and largest number of objects, components and items."""
 MODEL, RELATIONS = "3d/3dmodel.model", "_rels/.rels"
 """Usual name of the model, and that of the part that names it, in small letters."""
@@ -299,8 +299,8 @@ class ModelPart:
 
     def _count_node(self) -> None:
         self.nodes += 1
-        if self.nodes > MOST_NODES:
-            raise ValueError(f"it has over {MOST_NODES} objects, components and items")
+        if self.nodes > MOST_ITEMS:
+            raise ValueError(f"it has over {MOST_ITEMS} objects, components and items")
 
     def built(self) -> BuiltSurface:
         """Place the objects that the build names."""

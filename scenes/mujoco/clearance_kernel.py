@@ -8,7 +8,7 @@ from grasp_core.geometry.vectors_kernel import cross, dotted
 
 MOST_HALVINGS = 12
 """Halvings of the depth after which a pyramid is left as it is: the object is a sheet there."""
-PARALLEL_EDGES = 1e-12
+PARALLEL_SINE = 1e-12
 """Sine of the angle between edges below which their cross product is no axis."""
 TRIANGLE_CORNERS = 3
 
@@ -81,7 +81,7 @@ def _separated(solid: Array, along: Array, triangle: Array, slack: float) -> boo
     for i in range(2 * n * TRIANGLE_CORNERS):
         edge, side = along[i // TRIANGLE_CORNERS], sides[i % TRIANGLE_CORNERS]
         cross(edge, side, axis)
-        least = PARALLEL_EDGES * PARALLEL_EDGES * dotted(edge, edge) * dotted(side, side)
+        least = PARALLEL_SINE * PARALLEL_SINE * dotted(edge, edge) * dotted(side, side)
         if dotted(axis, axis) > least and _apart(axis, solid, triangle, slack):
             return True
     return False

@@ -34,7 +34,7 @@ from sim_validate.files.kept_figures import Kept, keeps
 from sim_validate.files.result_files import AboutObject
 from sim_validate.settings import ExecutionSettings
 
-KEPT_DIGITS = 12
+BASELINE_DIGITS = 12
 BASELINE_MARK = '"grasps_file"'
 
 
@@ -50,17 +50,17 @@ def in_baselines(kind: type) -> Iterator[Figure]:
         yield each._replace(kind=Annotated[Number, how]) if numbered else each
 
 
-@keeps(in_baselines(Verdict), KEPT_DIGITS)
+@keeps(in_baselines(Verdict), BASELINE_DIGITS)
 class VerdictFigures(Kept):
     """The figures of a verdict."""
 
 
-@keeps(in_baselines(Execution), KEPT_DIGITS)
+@keeps(in_baselines(Execution), BASELINE_DIGITS)
 class ExecutionFigures(Kept):
     """The figures of an execution."""
 
 
-@keeps(in_baselines(ExecutedGrasp), KEPT_DIGITS)
+@keeps(in_baselines(ExecutedGrasp), BASELINE_DIGITS)
 class ExecutedFigures(Kept):
     """The figures of a grasp that was to be executed."""
 

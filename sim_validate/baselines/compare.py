@@ -19,7 +19,7 @@ from grasp_core.declared import Declared, declared
 from grasp_core.figures import Compared, Shown, Worse, compared, figure, unit_of
 from grasp_core.files.records import UNRECORDED, record_of
 from grasp_core.transferring.transfer import FRICTION_BAND
-from sim_validate.baselines.baseline import KEPT_DIGITS, Baseline, KeptGrasp
+from sim_validate.baselines.baseline import BASELINE_DIGITS, Baseline, KeptGrasp
 from sim_validate.engine.traces import LET_GO, Outcome
 
 DIGITS_OF_CHANGE = 2
@@ -171,7 +171,7 @@ def _change(before: float, after: float, band: float) -> str:
     """Write a number before and after, to two digits of what changed, and its band."""
     change, largest = after - before, max(abs(before), abs(after))
     digits = math.ceil(math.log10(largest / abs(change))) + DIGITS_OF_CHANGE
-    digits = min(max(digits, LEAST_DIGITS), KEPT_DIGITS)
+    digits = min(max(digits, LEAST_DIGITS), BASELINE_DIGITS)
     share = f"{100.0 * change / before:+.2g} %, " if before > 0.0 else ""
     return f"{before:.{digits}g} -> {after:.{digits}g} ({share}band {band:.2g})"
 

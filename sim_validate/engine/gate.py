@@ -66,7 +66,7 @@ from sim_validate.engine.simulated_limits import SimulatedLimit, bisected_limits
 from sim_validate.engine.stepping import CLOCK_SLACK_S, Bench
 from sim_validate.engine.traces import holds
 
-LEAST_OFFSET, MOST_OFFSET = 0.01, 1.0
+LEAST_OFFSET, MOST_OFFSET_FRICTION = 0.01, 1.0
 """Least and largest critical friction that two offset fingers on the box can be made to need."""
 PUSH = 0.6
 """Normal force of the fingers on the box, relative to the largest normal force allowed."""
@@ -96,7 +96,7 @@ class ClosureCase:
     @property
     def offset_friction(self) -> float:
         """The friction under test, or the nearest one that offset fingers on a box can need."""
-        return min(max(self.friction, LEAST_OFFSET), MOST_OFFSET)
+        return min(max(self.friction, LEAST_OFFSET), MOST_OFFSET_FRICTION)
 
     @property
     def push(self) -> float:
