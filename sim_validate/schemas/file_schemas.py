@@ -10,6 +10,7 @@ import re
 from collections.abc import Mapping
 from functools import cache
 from pkgutil import resolve_name
+from threading import Lock
 from typing import Any, ClassVar, NamedTuple, cast
 
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
@@ -30,6 +31,8 @@ from sim_validate.commands.table import COMMANDS
 REPOSITORY = "https://example.org/graspproof"
 """Address of the repository, which .github/workflows/release.yml puts here."""
 DRAFT = "https://json-schema.org/draft/2020-12/schema"
+ONE_AT_A_TIME = Lock()
+"""Taken while a schema is made: pydantic fails where two threads build one class first."""
 IN_FILES = re.compile(r"\b(None|NaN)\b")
 
 
@@ -95,13 +98,14 @@ def schema_of(name: str) -> Mapping[str, Any]:
     """Return the JSON Schema of the kind of files with a short name."""
     called, place, by_users = FILE_KINDS[name]
     kind = resolve_name(place)
-    if issubclass(kind, Spoken):
-        made = _of_flags(kind)
-    else:
-        generator = _OfUsers if by_users else _OfFiles
-        made = adapter(kind).json_schema(
-            mode="serialization", by_alias=True, schema_generator=generator
-        )
+    with ONE_AT_A_TIME:
+        if issubclass(kind, Spoken):
+            made = _of_flags(kind)
+        else:
+            generator = _OfUsers if by_users else _OfFiles
+            made = adapter(kind).json_schema(
+                mode="serialization", by_alias=True, schema_generator=generator
+            )
     head = {"$schema": DRAFT, "$id": address(name), "title": f"graspproof {called}"}
     return head | {key: value for key, value in made.items() if key not in head}
 

@@ -131,7 +131,7 @@ def test_a_squeeze_that_is_not_found_or_proved_is_an_error(monkeypatch):
     monkeypatch.setattr(Reactions, "survives", lambda *_: False)
     with pytest.raises(gc.SolverError, match="proof that the squeeze survives its loads fails"):
         gc.best_squeeze(box(), opposed(), 0.5, ANY, max_push_n=10.0)
-    monkeypatch.setattr(module, "MOST_PROGRAMS", 0)
+    monkeypatch.setattr(module, "MOST_SQUEEZE_PROGRAMS", 0)
     with pytest.raises(gc.SolverError, match="no squeeze was found to survive the loads"):
         gc.best_squeeze(box(), opposed(), 0.5, ANY, max_push_n=10.0)
 

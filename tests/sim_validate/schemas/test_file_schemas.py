@@ -1,7 +1,10 @@
 """Files of every kind fit their schema, and damaged ones do not."""
 
 import json
+import subprocess
+import sys
 import tomllib
+from pathlib import Path
 
 import pytest
 from jsonschema import Draft202012Validator
@@ -24,6 +27,7 @@ from tests.damaged import damaged
 from tests.fuzzing.data_files import TARGETS
 from tests.schemas import faults_of, faults_of_file
 
+ROOT = Path(__file__).parents[3]
 CALLED = {"given": "contacts", "staged": "unit", "dataset-config": "dataset"}
 """Kinds whose targets have other names."""
 SCHEMED = [each for each in TARGETS if CALLED.get(each.name, each.name) in FILE_KINDS]
@@ -213,3 +217,17 @@ def test_every_flag_has_a_meaning():
         if not each.get("description") and "properties" not in each
     ]  # fmt: skip
     assert silent == []
+
+
+def test_threads_make_schemas_of_one_class_at_a_time():
+    code = """
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from sim_validate.schemas.file_schemas import schema_of
+sys.setswitchinterval(1e-6)
+with ThreadPoolExecutor(8) as pool:
+    print(len({*map(len, pool.map(schema_of.__wrapped__, ["verdicts"] * 8))}))
+"""
+    said = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True,
+                          check=True)  # fmt: skip
+    assert said.stdout == "1\n"
