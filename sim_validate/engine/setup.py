@@ -34,7 +34,7 @@ from grasp_core.settings import CHOSEN, named
 from grasp_core.values import Contact, Grasp
 from scenes.mujoco.closure_scene import Scene, build_scene, surface_of
 from scenes.settings import FingerSettings, PhysicsSettings, ScaledScene
-from sim_validate.kit.files import read_tables
+from sim_validate.files.toml_files import read_tables
 from sim_validate.settings import ChosenTrials, FrictionProtocol, HoldProtocol, LimitProtocol
 
 AXIS_NAMES = tuple(

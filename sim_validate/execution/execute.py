@@ -34,8 +34,8 @@ from sim_validate.execution.predictions import Holder, NoSqueezeError, found_eno
 from sim_validate.execution.simulate import HeldBench
 from sim_validate.execution.trials import run_controls
 from sim_validate.execution.verdict import ExecutedGrasp, Execution
-from sim_validate.kit.own_faults import OWN_FAULTS
-from sim_validate.kit.workers import each, processes
+from sim_validate.processes.own_faults import OWN_FAULTS
+from sim_validate.processes.workers import each, processes
 from sim_validate.settings import ExecutionSettings
 
 OUT_OF_REACH = 3.0

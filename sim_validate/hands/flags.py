@@ -13,7 +13,7 @@ from grasp_core.declared import declared
 from grasp_core.hands.settings import ReachSettings
 from grasp_core.kinds import Quantity, TorqueLimit
 from grasp_core.names import HANDS
-from sim_validate.kit.command_flags import (
+from sim_validate.commands.flags import (
     PLAIN,
     AtFriction,
     FirstOnly,
@@ -23,7 +23,7 @@ from sim_validate.kit.command_flags import (
     ProtocolName,
     Spoken,
 )
-from sim_validate.kit.workers import available_cores
+from sim_validate.processes.workers import available_cores
 
 HandOrFile = Annotated[str, arg(help=f"The hand: {', '.join(HANDS)}, or an MJCF or URDF file.")]
 FingertipNames = Annotated[str, arg(metavar="NAME,NAME,...", help=(

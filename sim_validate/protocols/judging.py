@@ -48,7 +48,7 @@ from sim_validate.execution.execute import given_contacts
 from sim_validate.hands.dexgraspbench import RecordedReach, hand_file, recorded_postures
 from sim_validate.hands.known_hand import KnownHand
 from sim_validate.hands.validate import hand_setup
-from sim_validate.kit.own_faults import OWN_FAULTS
+from sim_validate.processes.own_faults import OWN_FAULTS
 from sim_validate.protocols.published import PROTOCOLS, Passing, PublishedProtocol, Run
 from sim_validate.protocols.verdict import Judgement, OurVerdict, RunVerdict
 
