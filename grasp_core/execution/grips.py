@@ -167,7 +167,7 @@ class Grip(Declared):
     @cached_property
     def elastic_stiffness(self) -> Array:
         """K of (5), (6, 6) [N/m, N, N m]: what the springs alone resist."""
-        W = self._maps
+        W = self.maps
         return (W @ self.stiffness @ W.transpose(0, 2, 1)).sum(axis=0)
 
     @cached_property
@@ -205,7 +205,7 @@ class Grip(Declared):
     @cached_property
     def force_changes(self) -> Array:
         """Change of each contact force per motion of the object by (3), (k, 3, 6), world axes."""
-        return -self.stiffness @ self._maps.transpose(0, 2, 1)
+        return -self.stiffness @ self.maps.transpose(0, 2, 1)
 
     @cached_property
     def _scaled(self) -> Array:
@@ -244,14 +244,14 @@ class Grip(Declared):
         return units @ inverse @ units
 
     @cached_property
-    def _maps(self) -> Array:
+    def maps(self) -> Array:
         """W_i of (5), (k, 6, 3): from a force at each arm to its wrench."""
         return grasp_map(self.arms).reshape(WRENCH, -1, 3).transpose(1, 0, 2)
 
     @cached_property
     def local_maps(self) -> Array:
         """W_i F_i: from a force along the axes of each contact to its wrench, (k, 6, 3)."""
-        return self._maps @ self.frames
+        return self.maps @ self.frames
 
     @property
     def local_squeeze(self) -> Array:

@@ -212,7 +212,7 @@ class HandGrip(Grip):
         changes, turns = self._moved()
         total = self.rolling_stiffness - self.elastic_stiffness
         for k, (force, normal) in enumerate(zip(self.squeeze, self.normals, strict=True)):
-            total = total - self._maps[k] @ changes[k]
+            total = total - self.maps[k] @ changes[k]
             arm = float(self.tip_radius_m[k]) * cross_matrix(force) @ cross_matrix(normal)
             total[3:] += arm @ turns[k]
         return total
@@ -221,7 +221,7 @@ class HandGrip(Grip):
         """Return df of (6) and the turns v of fingertips per motion (d, t), (k, 3, 6) each."""
         stiffness, L, B = self._turning()
         S, back = np.asarray(np.linalg.inv(stiffness)), L.transpose(0, 2, 1)
-        moved: Array = self._maps.transpose(0, 2, 1) + back @ S @ B
+        moved: Array = self.maps.transpose(0, 2, 1) + back @ S @ B
         df = np.asarray(-np.linalg.solve(back @ S @ L, moved), dtype=np.float64)
         turns: Array = -self.joint_axes.transpose(0, 2, 1) @ S @ (L @ df + B)
         return df, turns

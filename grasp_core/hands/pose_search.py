@@ -102,14 +102,6 @@ class AskedPose:
     friction: float
     settings: ReachSettings
 
-    @property
-    def clearance(self) -> float:
-        """Return the least distance of everything from what it must not touch [m].
-
-        Links whose tips touch the object must only not overlap it.
-        """
-        return self.settings.clearance_m
-
     @cached_property
     def table(self) -> tuple[Array, float]:
         """Return the table's unit normal, (3,), and its height along it [m]: -inf for none."""
@@ -296,8 +288,9 @@ def find_pose(asked: AskedPose, choices: Sequence[tuple[int, ...]]) -> FoundPose
 def _tried(asked: AskedPose, used: Indices, aims: Targets, pose: HandPose) -> FoundPose | str:
     """Move the hand from one start; return a pose, or what is in the way."""
     kernel = compiled(POSE_KERNEL)
-    sums, room = kernel.empty_sums(asked.arrays, aims), asked.clearance + SEARCH_ROOM
-    far = Gaps(room, asked.clearance, room, EDGE_MARGIN, PULL, True, True)
+    sums, clear = kernel.empty_sums(asked.arrays, aims), asked.settings.clearance_m
+    room = clear + SEARCH_ROOM
+    far = Gaps(room, clear, room, EDGE_MARGIN, PULL, True, True)
     kernel.settle(asked.arrays, asked.tree, aims, far, pose, sums, MOST_SEARCH_STEPS, GOOD_MM)
     near = far._replace(overlaps=False, margin=LEAST_EDGE_MARGIN, pull=0.0)
     rest = None if sums.parts[0] > ROUGH_MM else _laid(asked, aims, near, pose)
@@ -352,7 +345,7 @@ def _are_within(aims: Targets, points: Array, slack: float) -> tuple[bool, ...]:
 
 def blocking(asked: AskedPose, pose: HandPose, fingers: Indices | None = None) -> str:
     """Return what a placed hand overlaps: `self`, `object`, `table`, or nothing."""
-    arrays, clearance = asked.arrays, asked.clearance
+    arrays, clearance = asked.arrays, asked.settings.clearance_m
     kernel = compiled("grasp_core.hands.collisions_kernel")
     needs = np.full(len(arrays.shape_links), clearance)
     if fingers is not None:
@@ -391,7 +384,7 @@ def opened(asked: AskedPose, found: FoundPose) -> tuple[Array | None, Array | No
 
 def _open_joints(asked: AskedPose, found: FoundPose, planned: Targets) -> Array | None:
     arrays, kernel = asked.arrays, compiled(POSE_KERNEL)
-    contacts, clear, held = found.certificate, asked.clearance, found.pose
+    contacts, clear, held = found.certificate, asked.settings.clearance_m, found.pose
     wanted = Gaps(clear, clear, clear, 0.0, 0.0, overlaps=True, palm_moves=False)
     for gap in GAPS_M:
         aims = planned._replace(

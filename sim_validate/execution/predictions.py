@@ -50,7 +50,7 @@ from typing import Any
 import numpy as np
 
 from grasp_core.arrays import Array, cross
-from grasp_core.closure.contacts import WRENCH, cross_matrix, grasp_map
+from grasp_core.closure.contacts import WRENCH, cross_matrix
 from grasp_core.errors import InputError, NoForcesError, SolverError
 from grasp_core.execution.best_squeeze import searched
 from grasp_core.execution.beyond_slip import loss_multiples
@@ -87,15 +87,14 @@ class HeldDynamics:
 
     def __init__(self, grip: Grip, layout: HeldLayout) -> None:
         self.grip, self.layout, axes = grip, layout, layout.axes
-        self.maps: Array = grasp_map(grip.arms).reshape(WRENCH, -1, 3).transpose(1, 0, 2)  # W_i
         self.dampers: Array = np.einsum("kij,kj,klj->kil", axes, layout.damping, axes)  # C_i
         self.tips: Array = np.einsum("kij,kj,klj->kil", axes, layout.tip_masses, axes)  # m_i
         self.own = np.zeros((WRENCH, WRENCH))  # M_o
         self.own[:3, :3] = layout.object_kg * np.eye(3)
         self.own[3:, 3:] = layout.inertia_kg_m2
         # M and C
-        self.mass: Array = self.own + np.einsum("kij,kjl,kml->im", self.maps, self.tips, self.maps)
-        self.damping: Array = np.einsum("kij,kjl,kml->im", self.maps, self.dampers, self.maps)
+        self.mass: Array = self.own + np.einsum("kij,kjl,kml->im", grip.maps, self.tips, grip.maps)
+        self.damping: Array = np.einsum("kij,kjl,kml->im", grip.maps, self.dampers, grip.maps)
 
     @property
     def lowest_frequency(self) -> float:
@@ -162,12 +161,12 @@ class HeldDynamics:
         bases = drive.accelerations[:, None, :3] + sideways + inwards
         load -= drive.accelerations @ self.own.T
         load[:, 3:] -= cross(rates, rates @ layout.inertia_kg_m2)
-        load -= np.einsum("kij,k,nkj->ni", self.maps, layout.tips_carried, bases)
+        load -= np.einsum("kij,k,nkj->ni", self.grip.maps, layout.tips_carried, bases)
         return load, bases
 
     def _responses(self, loads: Array, bases: Array) -> tuple[Array, Array]:
         """Return x, (drives, n, 6), and the contact forces' changes by (3), (drives, n, k, 3)."""
-        grip, turned_maps = self.grip, self.maps.transpose(0, 2, 1)
+        grip, turned_maps = self.grip, self.grip.maps.transpose(0, 2, 1)
         motion, speed, acceleration = self._solved(loads)
         inertia = self.tips @ turned_maps @ acceleration
         inertia += self.layout.tips_carried[:, None, None] * bases[..., None]

@@ -34,7 +34,6 @@ from typing import Any
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.closure.contacts import grasp_map
 from grasp_core.errors import InputError, SolverError
 from grasp_core.execution.first_slip import first_slip
 from grasp_core.execution.grips import Grip
@@ -288,9 +287,9 @@ def _sure(weaker: Grip, load: Array) -> float:
 
 def without_push(grip: Grip, finger: int, push: Array) -> Grip:
     """Return the squeeze that is left by (1) where a finger does not push."""
-    maps = grasp_map(grip.arms).reshape(len(grip.elastic_stiffness), -1, 3).transpose(1, 0, 2)
-    motion = np.asarray(np.linalg.solve(grip.elastic_stiffness, -maps[finger] @ push), dtype=float)
-    squeeze = grip.squeeze - np.einsum("kij,kmj,m->ki", grip.stiffness, maps, motion)
+    load = -grip.maps[finger] @ push
+    motion = np.asarray(np.linalg.solve(grip.elastic_stiffness, load), dtype=np.float64)
+    squeeze = grip.squeeze - np.einsum("kij,kmj,m->ki", grip.stiffness, grip.maps, motion)
     squeeze[finger] -= push
     return grip.squeezed(squeeze)
 
