@@ -14,7 +14,7 @@ from docstring_parser import DocstringStyle, parse
 
 from grasp_core.settings import Settings
 from sim_validate.closure.verdict import HoldsWrenches
-from sim_validate.kit.files import AboutGrasps, ResultFile
+from sim_validate.files.result_files import AboutGrasps, ResultFile
 
 PACKAGES = {"grasp_core": "gc", "scenes": "scenes", "sim_validate": "sv"}
 UNTOLD = ("Key", "Shape", "Shown", "UNRECORDED", "FLAT")

@@ -18,7 +18,7 @@ from sphinx.writers.html5 import HTML5Translator
 sys.path.insert(0, str(Path(__file__).parent))
 import api_reference
 
-from sim_validate.kit.schemas import KINDS, schema_text
+from sim_validate.schemas.file_schemas import KINDS, schema_text
 
 project = "graspproof"
 version = release = version_of("graspproof")

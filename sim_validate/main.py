@@ -18,8 +18,7 @@ from tyro.conf import FlagCreatePairsOff
 
 from grasp_core.errors import GraspError, InputError
 from grasp_core.messages import FieldError, near, shown
-from sim_validate.kit.commands import COMMANDS, GROUPS, config_of, examples_for
-from sim_validate.kit.exit_codes import (
+from sim_validate.commands.exit_codes import (
     Exit,
     FlagsError,
     end_streams,
@@ -27,11 +26,12 @@ from sim_validate.kit.exit_codes import (
     reason_of,
     steady_streams,
 )
-from sim_validate.kit.workers import interrupts_noted
+from sim_validate.commands.table import COMMANDS, GROUPS, config_of, examples_for
+from sim_validate.processes.interrupts import interrupts_noted
 
 if TYPE_CHECKING:
-    from sim_validate.kit.command_flags import Spoken
-    from sim_validate.kit.console import Reporter
+    from sim_validate.commands.console import Reporter
+    from sim_validate.commands.flags import Spoken
 
 ABOUT = (
     "Four-finger force-closure grasps, proved and simulated. Every command also takes "
@@ -84,7 +84,8 @@ def _parsed(arguments: list[str]) -> tuple[str, "Spoken"]:
     if name not in COMMANDS:
         _list_commands(name, words)
     # what a command needs is loaded only for that command
-    from sim_validate.kit.flag_values import REGISTRY, flags_of, with_config
+    from sim_validate.commands.config_file import with_config
+    from sim_validate.commands.flag_values import REGISTRY, flags_of
 
     kind: Any = resolve_name(f"sim_validate.{COMMANDS[name].flags}")
     words = with_config(words[len(name.split()) :], path, kind)
@@ -149,7 +150,7 @@ def _dispatch(name: str, command: "Spoken") -> int:
     speech = command.speech
     try:
         with interrupts_noted():
-            from sim_validate.kit.console import Reporter
+            from sim_validate.commands.console import Reporter
 
             reporter = Reporter(speech.quiet, speech.verbose, speech.json)
             _warn(name, command, reporter)
@@ -187,7 +188,7 @@ def _warn(name: str, command: Any, reporter: "Reporter") -> None:
 
 
 def _complain(message: str, code: Exit) -> int:
-    from sim_validate.kit.console import printable
+    from sim_validate.commands.console import printable
 
     if sys.stderr is not None:  # pyright: ignore[reportUnnecessaryComparison] - may be closed
         sys.stderr.write(f"graspproof: {printable(message)}\n")

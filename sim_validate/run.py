@@ -14,18 +14,13 @@ from grasp_core.records.grasps_json import plan_to_json
 from grasp_core.stopping import Stop
 from sim_validate.closure.command import prepared, simulate_grasps
 from sim_validate.closure.validate import checked_for
+from sim_validate.commands import simulation_flags
+from sim_validate.commands.console import Reporter
+from sim_validate.commands.exit_codes import Exit, reason_of
+from sim_validate.commands.flags import Report
 from sim_validate.execution.command import execute_grasps, execution_settings, refuse_executing
-from sim_validate.kit import simulation_flags
-from sim_validate.kit.command_flags import Report
-from sim_validate.kit.console import Reporter
-from sim_validate.kit.exit_codes import Exit, reason_of
-from sim_validate.kit.files import (
-    REPORT,
-    alone_in,
-    remove_results,
-    require_report_folder,
-)
-from sim_validate.kit.workers import interrupts_end
+from sim_validate.files.output_folders import alone_in
+from sim_validate.files.results_folder import REPORT, remove_results, require_report_folder
 from sim_validate.planning.asked_objects import asked_finger, object_to_plan
 from sim_validate.planning.plan import (
     plan_object,
@@ -35,6 +30,7 @@ from sim_validate.planning.plan import (
     show_gains,
     with_regions,
 )
+from sim_validate.processes.interrupts import interrupts_end
 from sim_validate.report.command import shown_report
 
 RESULTS = Path("graspproof-out")

@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, settings
 
 ROOT = Path(__file__).parents[1]
 COMPILE = """
-from sim_validate.kit.compiling import EVERYTHING, compile_loops, must_compile
+from sim_validate.processes.compiling import EVERYTHING, compile_loops, must_compile
 if must_compile(EVERYTHING, jobs=2):
     compile_loops(EVERYTHING)
 """

@@ -7,7 +7,7 @@ import tomllib
 from jsonschema import Draft202012Validator
 
 from grasp_core.files.file_kinds import kind_of
-from sim_validate.kit.schemas import KINDS, address, schema_of
+from sim_validate.schemas.file_schemas import KINDS, address, schema_of
 
 NAMES = {each.called: name for name, each in KINDS.items()}
 ADDRESSED = re.compile(rf"#:schema {re.escape(address('NAME'))}\n".replace("NAME", r"(\w+)"))

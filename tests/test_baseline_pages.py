@@ -9,7 +9,7 @@ import pytest
 
 from grasp_core.settings import for_users
 from sim_validate.baselines.suite import Suite, suite_from_toml
-from sim_validate.kit.exit_codes import Exit
+from sim_validate.commands.exit_codes import Exit
 from sim_validate.main import main
 from sim_validate.settings import Noise
 from tests import docs_pictures

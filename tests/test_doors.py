@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from sim_validate.kit.exit_codes import Exit
+from sim_validate.commands.exit_codes import Exit
 from sim_validate.main import main
 
 ROOT = Path(__file__).parent.parent
@@ -25,7 +25,7 @@ NOT_TO_PLAN_AGAIN = (
     "grasp_core.optimizing", "sim_validate.engine", "sim_validate.report",
 )  # fmt: skip
 """What planning does not need where its loops are kept already."""
-OTHER_FLAGS = ("sim_validate.kit.simulation_flags", "sim_validate.datasets.flags")
+OTHER_FLAGS = ("sim_validate.commands.simulation_flags", "sim_validate.datasets.flags")
 
 
 def imported(code, among, **environment):
@@ -41,7 +41,7 @@ def imported(code, among, **environment):
 
 
 def test_importing_the_packages_imports_nothing_heavy():
-    modules = ("grasp_core", "scenes", "sim_validate.main", "sim_validate.kit.command_flags")
+    modules = ("grasp_core", "scenes", "sim_validate.main", "sim_validate.commands.flags")
     assert imported(f"import {', '.join(modules)}", HEAVY) == ([], "")
 
 

@@ -30,8 +30,8 @@ from sim_validate.closure.verdict import Verdict
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.engine.traces import Outcome
 from sim_validate.execution.verdict import ExecutedGrasp, Execution
-from sim_validate.kit.files import AboutObject
-from sim_validate.kit.kept_figures import Kept, keeps
+from sim_validate.files.kept_figures import Kept, keeps
+from sim_validate.files.result_files import AboutObject
 from sim_validate.settings import ExecutionSettings
 
 DIGITS = 12

@@ -33,9 +33,9 @@ from sim_validate.engine.setup import (
 )
 from sim_validate.execution.execute import ExecutionJob, executed_grasp
 from sim_validate.execution.verdict import ExecutedGrasp, held_controls_in_words, losses_in_words
-from sim_validate.kit.files import AboutObject
-from sim_validate.kit.own_faults import OWN_FAULTS
-from sim_validate.kit.workers import each, processes
+from sim_validate.files.result_files import AboutObject
+from sim_validate.processes.own_faults import OWN_FAULTS
+from sim_validate.processes.workers import each, processes
 
 Report = Callable[[int, int], None]
 

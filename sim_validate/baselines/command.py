@@ -13,9 +13,9 @@ from sim_validate.baselines.check import Checked, check, measured, setup_for
 from sim_validate.baselines.compare import Finding, Status, failing
 from sim_validate.baselines.part import Present, present
 from sim_validate.closure.command import check_noise
+from sim_validate.commands.console import TABLE_ROWS, Reporter
+from sim_validate.commands.exit_codes import Exit
 from sim_validate.engine.setup import Agenda, setup_from_file, wrenches_from_file
-from sim_validate.kit.console import TABLE_ROWS, Reporter
-from sim_validate.kit.exit_codes import Exit
 
 
 def record_baseline(command: baseline_flags.Record, reporter: Reporter) -> int:

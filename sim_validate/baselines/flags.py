@@ -9,8 +9,8 @@ from tyro.conf import Positional, arg
 from grasp_core.declared import declared
 from grasp_core.kinds import Seed
 from grasp_core.transferring.settings import IfChanged
-from sim_validate.kit.command_flags import PLAIN, FirstOnly, GraspsFile, Jobs, Spoken
-from sim_validate.kit.workers import available_cores
+from sim_validate.commands.flags import PLAIN, FirstOnly, GraspsFile, Jobs, Spoken
+from sim_validate.processes.workers import available_cores
 from sim_validate.settings import ChosenTrials
 
 MeshFile = Annotated[Path | None, arg(help=(

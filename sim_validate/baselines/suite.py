@@ -30,7 +30,7 @@ from sim_validate.closure.verdict import Verdict
 from sim_validate.engine.setup import Agenda, Setup, wrenches_from_file
 from sim_validate.execution.execute import ExecutionJob, executed_grasp
 from sim_validate.execution.verdict import ExecutedGrasp
-from sim_validate.kit.files import read_tables
+from sim_validate.files.toml_files import read_tables
 from sim_validate.settings import ExecutionSettings, LimitSearch, Noise
 
 ENDING = ".grasps.toml"

@@ -24,6 +24,10 @@ from scenes.drawing.clips import GraphicsError, available_graphics, has_display,
 from scenes.example_objects import example_object
 from sim_validate.closure.validate import checked_for, validate, validated
 from sim_validate.closure.verdict import Verdict, Verdicts, trace_arrays
+from sim_validate.commands import flags
+from sim_validate.commands.console import TABLE_ROWS, Reporter, warn_of
+from sim_validate.commands.exit_codes import Exit, FlagsError
+from sim_validate.commands.simulation_flags import Testing
 from sim_validate.engine.gate import ClosureCase
 from sim_validate.engine.known_cases import measured
 from sim_validate.engine.setup import (
@@ -35,13 +39,10 @@ from sim_validate.engine.setup import (
     wrenches_from_file,
 )
 from sim_validate.engine.traces import Outcome
-from sim_validate.kit import command_flags
-from sim_validate.kit.compiling import EVERYTHING, compile_loops
-from sim_validate.kit.console import TABLE_ROWS, Reporter, warn_of
-from sim_validate.kit.exit_codes import Exit, FlagsError
-from sim_validate.kit.files import remove_results, write_arrays
-from sim_validate.kit.simulation_flags import Testing
-from sim_validate.kit.workers import available_cores
+from sim_validate.files.array_files import write_arrays
+from sim_validate.files.results_folder import remove_results
+from sim_validate.processes.compiling import EVERYTHING, compile_loops
+from sim_validate.processes.workers import available_cores
 from sim_validate.settings import ChosenTrials, Noise
 
 
@@ -140,7 +141,7 @@ LOOPS = {
 }
 
 
-def check_installation(command: command_flags.Doctor, reporter: Reporter) -> int:
+def check_installation(command: flags.Doctor, reporter: Reporter) -> int:
     """Plan and simulate a tetrahedron whose answers are known, and report all checks."""
     if command.compile:
         reporter.say("compiling all inner loops, which takes two minutes of one core")

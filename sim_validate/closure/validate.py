@@ -54,8 +54,8 @@ from sim_validate.engine.simulated_friction import CriticalFriction, released_fr
 from sim_validate.engine.simulated_limits import SimulatedLimit, bisected_limits, ramped_limits
 from sim_validate.engine.stepping import Bench
 from sim_validate.engine.traces import LET_GO, HoldVerdict, Outcome, judge
-from sim_validate.kit.own_faults import OWN_FAULTS
-from sim_validate.kit.workers import each, processes
+from sim_validate.processes.own_faults import OWN_FAULTS
+from sim_validate.processes.workers import each, processes
 
 
 def validate(

@@ -33,7 +33,7 @@ from sim_validate.engine.setup import WEAKEST, Agenda, Setup
 from sim_validate.engine.simulated_friction import CriticalFriction
 from sim_validate.engine.simulated_limits import SimulatedLimit
 from sim_validate.engine.traces import LET_GO, HoldVerdict, Outcome, Trace
-from sim_validate.kit.files import AboutGrasps, AboutObject
+from sim_validate.files.result_files import AboutGrasps, AboutObject
 from sim_validate.settings import Noise
 
 AGREEMENT = 0.02

@@ -47,6 +47,7 @@ from grasp_core.messages import FieldError, shown
 from grasp_core.processes import Processes
 from grasp_core.provenance import arithmetic
 from scenes.drawing.pages import filled
+from sim_validate.datasets.clusters import Cluster
 from sim_validate.datasets.columns import ROWS, dataset_tables
 from sim_validate.datasets.config import (
     KEYS,
@@ -86,9 +87,10 @@ from sim_validate.datasets.work_units import (
 from sim_validate.engine.gate import ClosureCase
 from sim_validate.engine.known_cases import checked
 from sim_validate.engine.setup import Setup
-from sim_validate.kit.files import alone_in, path_inside, whole_folder
-from sim_validate.kit.locks import entries
-from sim_validate.kit.workers import Cluster, check_interrupted
+from sim_validate.files.locks import entries
+from sim_validate.files.named_paths import path_inside
+from sim_validate.files.output_folders import alone_in, whole_folder
+from sim_validate.processes.interrupts import check_interrupted
 
 HASH = re.compile(r"[0-9a-f]{64}")
 OTHERS = "others"

@@ -35,7 +35,7 @@ from sim_validate.datasets.parquet import (
 )
 from sim_validate.engine.traces import HoldVerdict, Outcome
 from sim_validate.execution.verdict import Execution, ExecutionTrial
-from sim_validate.kit.kept_figures import Kept, keeps
+from sim_validate.files.kept_figures import Kept, keeps
 
 GIVEN = "given"
 """Label of grasps that another tool made."""

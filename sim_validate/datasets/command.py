@@ -10,8 +10,11 @@ from grasp_core.files.records import record_of
 from grasp_core.mesh_files.limits import FORMATS
 from grasp_core.processes import local_processes
 from grasp_core.settings import extended
+from sim_validate.commands.console import TABLE_ROWS, Reporter, say_cut
+from sim_validate.commands.exit_codes import Exit
 from sim_validate.datasets import flags as dataset_flags
 from sim_validate.datasets.build import CARD, Engine, build
+from sim_validate.datasets.clusters import dask_workers, ray_workers
 from sim_validate.datasets.config import (
     CREDITS,
     DatasetConfig,
@@ -22,9 +25,6 @@ from sim_validate.datasets.config import (
 from sim_validate.datasets.isaac import export
 from sim_validate.datasets.open_dataset import CONFIG, splits_in_words
 from sim_validate.datasets.verify import verify
-from sim_validate.kit.console import TABLE_ROWS, Reporter, say_cut
-from sim_validate.kit.exit_codes import Exit
-from sim_validate.kit.workers import dask_workers, ray_workers
 
 
 def build_dataset(command: dataset_flags.Build, reporter: Reporter) -> int:

@@ -220,7 +220,7 @@ class DatasetConfig(PlannedContent):
 
 def config_from_toml(path: Path) -> DatasetConfig:
     """Read a configuration from a file."""
-    from sim_validate.kit.files import read_tables  # slow, and no flag needs it
+    from sim_validate.files.toml_files import read_tables  # slow, and no flag needs it
 
     given = read_tables(path)
     with about(path):
@@ -237,7 +237,7 @@ def _is_date(text: str) -> bool:
 
 def config_to_toml(config: DatasetConfig) -> str:
     """Write a configuration as a file, whose first line tells editors where its schema is."""
-    from sim_validate.kit.schemas import address  # slow, and no flag needs it
+    from sim_validate.schemas.file_schemas import address  # slow, and no flag needs it
 
     return f"#:schema {address('dataset')}\n{settings_text(config)}"
 

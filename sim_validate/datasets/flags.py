@@ -9,9 +9,9 @@ from tyro.conf import Positional
 from grasp_core.declared import declared
 from grasp_core.kinds import Count, Seed, Share
 from grasp_core.settings import Settings
+from sim_validate.commands.flags import PLAIN, Positive, Spoken
 from sim_validate.datasets.config import Content, Learning, PlannedContent, SplitName
-from sim_validate.kit.command_flags import PLAIN, Positive, Spoken
-from sim_validate.kit.workers import available_cores
+from sim_validate.processes.workers import available_cores
 
 
 @declared

@@ -31,7 +31,7 @@ from sim_validate.datasets.columns import GIVEN, GraspRow, ObjectRow
 from sim_validate.datasets.config import CREDITS, SHORT, Name, SplitName, quoted
 from sim_validate.datasets.open_dataset import Dataset, mesh_path, select
 from sim_validate.datasets.parquet import pyarrow
-from sim_validate.kit.files import whole_folder
+from sim_validate.files.output_folders import whole_folder
 
 AXES = "xyz"
 HEAD = """\

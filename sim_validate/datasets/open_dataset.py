@@ -59,7 +59,7 @@ from sim_validate.datasets.config import (
 )
 from sim_validate.datasets.parquet import Columns, Tables, each_batch, read_columns
 from sim_validate.engine.setup import Agenda, Setup
-from sim_validate.kit.files import path_inside, require_inside
+from sim_validate.files.named_paths import path_inside, require_inside
 from sim_validate.planning.asked_objects import NAMED, some
 
 CONFIG = "config.toml"

@@ -56,7 +56,7 @@ from sim_validate.datasets.work_units import PLANNED, WorkUnit, made_of, provena
 from sim_validate.engine.traces import Outcome
 from sim_validate.execution.execute import tip_radius
 from sim_validate.execution.verdict import ExecutionTrial, may_slip
-from sim_validate.kit.locks import LOCK
+from sim_validate.files.locks import LOCK
 
 MOST_NAMED = 20
 """Largest number of faults that are listed for one object at one friction."""

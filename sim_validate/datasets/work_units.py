@@ -56,8 +56,8 @@ from sim_validate.datasets.open_dataset import mesh_path, mesh_text
 from sim_validate.datasets.parquet import Cells
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.engine.traces import Outcome
-from sim_validate.kit.own_faults import OWN_FAULTS
 from sim_validate.planning.asked_objects import is_mesh_file
+from sim_validate.processes.own_faults import OWN_FAULTS
 
 NO_FRICTION = 1.0
 """Friction put in for files that state none; it is never used, because a dataset's configuration

@@ -35,7 +35,7 @@ from grasp_core.values import Contact, Grasp
 from scenes.mujoco.closure_scene import Scene, build_scene, surface_of
 from scenes.mujoco_options import PhysicsSettings
 from scenes.settings import FingerSettings, ScaledScene
-from sim_validate.kit.files import read_tables
+from sim_validate.files.toml_files import read_tables
 from sim_validate.settings import ChosenTrials, FrictionProtocol, HoldProtocol, LimitProtocol
 
 AXIS_NAMES = tuple(

@@ -24,6 +24,9 @@ from grasp_core.stopping import never
 from grasp_core.values import Grasp
 from scenes import exports
 from scenes.settings import ScaledScene
+from sim_validate.commands import simulation_flags
+from sim_validate.commands.console import TABLE_ROWS, Reporter, warn_of
+from sim_validate.commands.exit_codes import Exit, FlagsError
 from sim_validate.engine.setup import Setup, physics_from_file, with_planned_radius
 from sim_validate.execution.execute import ExecutionJob, Fingertips, executed
 from sim_validate.execution.verdict import (
@@ -36,10 +39,9 @@ from sim_validate.execution.verdict import (
     multiple_in_words,
     totals_in_words,
 )
-from sim_validate.kit import simulation_flags
-from sim_validate.kit.console import TABLE_ROWS, Reporter, warn_of
-from sim_validate.kit.exit_codes import Exit, FlagsError
-from sim_validate.kit.files import AboutObject, alone_in, remove_results
+from sim_validate.files.output_folders import alone_in
+from sim_validate.files.result_files import AboutObject
+from sim_validate.files.results_folder import remove_results
 from sim_validate.planning.asked_objects import asked_grasps, grasp_with_id
 from sim_validate.settings import ChosenExecution, ExecutionSettings, Holding
 

@@ -62,8 +62,8 @@ from sim_validate.execution.simulate import (
 )
 from sim_validate.execution.trials import Trial, run_controls
 from sim_validate.execution.verdict import ExecutedGrasp, Execution, ExecutionTrial
-from sim_validate.kit.own_faults import OWN_FAULTS
-from sim_validate.kit.workers import each, processes
+from sim_validate.processes.own_faults import OWN_FAULTS
+from sim_validate.processes.workers import each, processes
 from sim_validate.settings import ExecutionSettings
 
 FINE_S = 1.25e-4

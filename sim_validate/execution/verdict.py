@@ -21,7 +21,7 @@ from grasp_core.kinds import FLAT, Number, OrInfinity, Quantity, path_of
 from grasp_core.messages import MILLI, FieldError
 from grasp_core.solvers.ties import first_best
 from scenes.mujoco_options import PhysicsSettings
-from sim_validate.kit.files import AboutGrasps
+from sim_validate.files.result_files import AboutGrasps
 from sim_validate.settings import ExecutionSettings, TrialKind
 
 Fate: TypeAlias = Literal["stuck", "slipped", "dropped", "diverged"]

@@ -28,8 +28,13 @@ from grasp_core.objects.polyhedron import Polyhedron, is_convex
 from grasp_core.planning.result import Plan
 from grasp_core.values import Grasp
 from scenes.hand_files.loading import load_hand
+from sim_validate.commands.console import TABLE_ROWS, Reporter, say_cut
+from sim_validate.commands.exit_codes import Exit, FlagsError
 from sim_validate.engine.setup import Agenda
 from sim_validate.execution.verdict import ExecutedGrasp, held_controls_in_words, loss_in_words
+from sim_validate.files.output_folders import alone_in
+from sim_validate.files.result_files import AboutObject
+from sim_validate.files.results_folder import remove_results
 from sim_validate.hands import flags as hand_flags
 from sim_validate.hands.dexgraspbench import dex_record, write_dex_object, write_dex_record
 from sim_validate.hands.reaches import CarriedMass, ReachedGrasp, Reaches, ReachSettings
@@ -40,12 +45,9 @@ from sim_validate.hands.trials import (
     hand_execution_settings,
     validate_hand,
 )
-from sim_validate.kit import workers
-from sim_validate.kit.compiling import REACHING, compile_loops, must_compile
-from sim_validate.kit.console import TABLE_ROWS, Reporter, say_cut
-from sim_validate.kit.exit_codes import Exit, FlagsError
-from sim_validate.kit.files import AboutObject, alone_in, remove_results
 from sim_validate.planning.asked_objects import asked_grasps
+from sim_validate.processes import workers
+from sim_validate.processes.compiling import REACHING, compile_loops, must_compile
 from sim_validate.settings import ExecutionSettings
 
 HELD = Agenda(critical_friction=False)

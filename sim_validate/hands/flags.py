@@ -12,7 +12,7 @@ from tyro.conf import Positional, UseAppendAction, arg
 from grasp_core.declared import declared
 from grasp_core.kinds import Direction, HandClearance, Quantity, Seed, Starts, TorqueLimit
 from grasp_core.names import HANDS
-from sim_validate.kit.command_flags import (
+from sim_validate.commands.flags import (
     AtFriction,
     FirstOnly,
     GraspId,
@@ -21,7 +21,7 @@ from sim_validate.kit.command_flags import (
     ProtocolName,
     Spoken,
 )
-from sim_validate.kit.workers import available_cores
+from sim_validate.processes.workers import available_cores
 
 HandName = Annotated[str, arg(help=f"The hand: {', '.join(HANDS)}, or an MJCF or URDF file.")]
 Fingertips = Annotated[str, arg(metavar="NAME,NAME,...", help=(

@@ -23,8 +23,8 @@ from grasp_core.hands.reach import HandReach
 from grasp_core.kinds import FLAT, Direction, HandClearance, NotNegative, Seed, Starts
 from grasp_core.settings import Settings
 from sim_validate.execution.verdict import ExecutedGrasp
+from sim_validate.files.result_files import AboutGrasps
 from sim_validate.hands.trials import HandVerdict
-from sim_validate.kit.files import AboutGrasps
 from sim_validate.settings import ExecutionSettings
 
 TOUCHING_M = 1e-4

@@ -33,11 +33,11 @@ from grasp_core.quality.metrics import hull_volume, min_weight, smallest_singula
 from grasp_core.quality.wrench_limits import axis_wrenches, wrench_limits
 from grasp_core.records.grasps_json import ContactSet, Overrides, contact_sets_from_json
 from grasp_core.solvers.ties import first_best
-from sim_validate.kit import command_flags
-from sim_validate.kit.console import TABLE_ROWS, Reporter
-from sim_validate.kit.exit_codes import Exit
-from sim_validate.kit.files import ResultFile
-from sim_validate.kit.workers import each
+from sim_validate.commands import flags
+from sim_validate.commands.console import TABLE_ROWS, Reporter
+from sim_validate.commands.exit_codes import Exit
+from sim_validate.files.result_files import ResultFile
+from sim_validate.processes.workers import each
 
 MOST_EDGES = 10_000
 """Most edges of all pyramids of a grasp, whose hull in six dimensions then takes ten seconds."""
@@ -317,7 +317,7 @@ STEP = 10.0**-DIGITS
 """Step to which ends of a printed interval are rounded, and to which they are reproducible."""
 
 
-def analyze_file(command: command_flags.Analyze, reporter: Reporter) -> int:
+def analyze_file(command: flags.Analyze, reporter: Reporter) -> int:
     """Analyse the grasps of a contacts file; an interrupted run still shows its results so far."""
     overrides = Overrides(command.friction, command.torque_scale_m, command.outward)
     text = read_text(command.contacts)

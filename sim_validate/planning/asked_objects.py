@@ -12,8 +12,8 @@ from grasp_core.planning.result import Plan
 from grasp_core.records.grasps_json import load_grasps
 from grasp_core.values import Grasp
 from scenes.example_objects import example_object
-from sim_validate.kit import command_flags
-from sim_validate.kit.console import Reporter
+from sim_validate.commands import flags
+from sim_validate.commands.console import Reporter
 
 NAMED = 5
 """Largest number of names that a message lists."""
@@ -25,7 +25,7 @@ def is_mesh_file(name: str) -> bool:
     return path.suffix.lower().lstrip(".") in FORMATS or path.is_file()
 
 
-def load_object(name: str, mesh: command_flags.Mesh) -> Polyhedron:
+def load_object(name: str, mesh: flags.Mesh) -> Polyhedron:
     """Load a mesh file, or a built-in object if the name has no mesh ending."""
     path = Path(name)
     if path.suffix.lower() == ".json":
@@ -47,7 +47,7 @@ def load_object(name: str, mesh: command_flags.Mesh) -> Polyhedron:
             "file exists"
         )
     unlimited = replace(mesh.choices, **asdict(MeshLimits()))
-    if replace(mesh, choices=unlimited) != command_flags.Mesh():
+    if replace(mesh, choices=unlimited) != flags.Mesh():
         raise InputError(
             f"{name} is a built-in object, so leave out --unit, --scale, --faces, --patches..., "
             "--flatness-m, --largest-part and --center-of-mass-m, which say how mesh files are read"
@@ -55,7 +55,7 @@ def load_object(name: str, mesh: command_flags.Mesh) -> Polyhedron:
     return example_object(name)
 
 
-def object_to_plan(name: str, planning: command_flags.Planning, reporter: Reporter) -> Polyhedron:
+def object_to_plan(name: str, planning: flags.Planning, reporter: Reporter) -> Polyhedron:
     """Load the object and check that the planning flags fit it."""
     if planning.ceiling is not None and not planning.optimize:
         raise InputError(
@@ -85,7 +85,7 @@ def object_to_plan(name: str, planning: command_flags.Planning, reporter: Report
     return body
 
 
-def asked_finger(planning: command_flags.Planning) -> Finger | None:
+def asked_finger(planning: flags.Planning) -> Finger | None:
     """Build the finger whose straight free path is planned, or None if no flag asks for it."""
     if planning.approach_m is None:
         if planning.finger_radius_m is not None and not planning.optimize:

@@ -32,10 +32,11 @@ from grasp_core.optimizing.contact_places import grounds_of
 from grasp_core.optimizing.support_cuts import write_proof
 from grasp_core.stopping import Stop
 from grasp_core.values import FINGERS, FaceQuadruple, Grasp
-from sim_validate.kit import command_flags
-from sim_validate.kit.console import Reporter
-from sim_validate.kit.exit_codes import Exit
-from sim_validate.kit.files import BEST_PROOF, AboutObject, ResultFile
+from sim_validate.commands import flags
+from sim_validate.commands.console import Reporter
+from sim_validate.commands.exit_codes import Exit
+from sim_validate.files.result_files import AboutObject, ResultFile
+from sim_validate.files.results_folder import BEST_PROOF
 
 MEASURES: Mapping[MeasureName, tuple[str, str, str]] = {
     "ferrari-canny": ("quality", "Ferrari-Canny quality", " N"),
@@ -155,13 +156,13 @@ ROUGH = 1e-3
 """Gap between the bounds of what planned grasps hold."""
 
 
-def check_object(body: Polyhedron, planning: command_flags.Planning) -> None:
+def check_object(body: Polyhedron, planning: flags.Planning) -> None:
     """Refuse an object with too many places for contacts, before anything is searched."""
     grounds_of(body, checked_clearance(body, planning.edge_clearance_m or None))
 
 
 def search_best(
-    body: Polyhedron, command: command_flags.Plan, wrenches: Array | None, stop: Stop,
+    body: Polyhedron, command: flags.Plan, wrenches: Array | None, stop: Stop,
     reporter: Reporter,
 ) -> BestGrasp:  # fmt: skip
     """Search for the best grasp, for wrenches (m, 6) if asked, and show how the gap closes."""

@@ -20,9 +20,9 @@ from grasp_core.objects.surface import Face
 from grasp_core.planning.quadruples import LEAST_SPAN_ANGLE
 from scenes.drawing.pictures import MOST_NUMBERED, write_object_picture
 from scenes.example_objects import example_names
-from sim_validate.kit import command_flags
-from sim_validate.kit.console import Reporter
-from sim_validate.kit.exit_codes import Exit
+from sim_validate.commands import flags
+from sim_validate.commands.console import Reporter
+from sim_validate.commands.exit_codes import Exit
 from sim_validate.planning.asked_objects import load_object
 
 CM3 = 1e6
@@ -45,7 +45,7 @@ class ListedFace(Declared):
     center_m: Point
 
 
-def inspect_object(command: command_flags.Inspect, reporter: Reporter) -> int:
+def inspect_object(command: flags.Inspect, reporter: Reporter) -> int:
     """Show the facts about a mesh, such as its faces and mass properties."""
     body = load_object(command.object, command.mesh)
     spanning = (
@@ -125,7 +125,7 @@ def _on_faces(body: Polyhedron, facts: dict[str, Any]) -> str:
     )
 
 
-def list_objects(_: command_flags.Objects, reporter: Reporter) -> int:
+def list_objects(_: flags.Objects, reporter: Reporter) -> int:
     """List the names of the built-in objects."""
     names = example_names()
     reporter.document({"objects": list(names)})

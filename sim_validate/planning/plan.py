@@ -1,6 +1,6 @@
 """Runs the command `plan`, which finds certified grasps of an object and writes them to a file.
 
-Its flags: `command_flags.Plan`. What --optimize, --regions and --best alone need is imported late.
+Its flags: `flags.Plan`. What --optimize, --regions and --best alone need is imported late.
 """
 
 import math
@@ -30,13 +30,15 @@ from grasp_core.records.grasps_json import plan_to_json
 from grasp_core.settings import types
 from grasp_core.stopping import Stop
 from grasp_core.values import Grasp
-from sim_validate.kit import command_flags
-from sim_validate.kit.compiling import PLANNING, compile_loops, must_compile
-from sim_validate.kit.console import TABLE_ROWS, Reporter, say_cut
-from sim_validate.kit.exit_codes import Exit, FlagsError
-from sim_validate.kit.files import alone_in, remove_results
-from sim_validate.kit.workers import each, interrupts_end
+from sim_validate.commands import flags
+from sim_validate.commands.console import TABLE_ROWS, Reporter, say_cut
+from sim_validate.commands.exit_codes import Exit, FlagsError
+from sim_validate.files.output_folders import alone_in
+from sim_validate.files.results_folder import remove_results
 from sim_validate.planning.asked_objects import asked_finger, object_to_plan
+from sim_validate.processes.compiling import PLANNING, compile_loops, must_compile
+from sim_validate.processes.interrupts import interrupts_end
+from sim_validate.processes.workers import each
 
 if TYPE_CHECKING:
     from grasp_core.optimizing.best_grasp import BestGrasp
@@ -58,7 +60,7 @@ def ready(jobs: int, reporter: Reporter) -> None:
 
 
 def plan_object(
-    body: Polyhedron, planning: command_flags.Planning, jobs: int, stop: Stop, later: int,
+    body: Polyhedron, planning: flags.Planning, jobs: int, stop: Stop, later: int,
     reporter: Reporter,
 ) -> Plan:  # fmt: skip
     """Plan the grasps of an object and, if asked for, improve them, with time for later phases."""
@@ -85,7 +87,7 @@ def plan_object(
 
 
 def improved(
-    body: Polyhedron, found: Plan, planning: command_flags.Planning, jobs: int, stop: Stop,
+    body: Polyhedron, found: Plan, planning: flags.Planning, jobs: int, stop: Stop,
     reporter: Reporter,
 ) -> Plan:  # fmt: skip
     """Move contacts to raise the quality; keep one of grasps that end alike, the best first.
@@ -119,9 +121,7 @@ def _same_contacts(one: Grasp, two: Grasp, slack: float) -> bool:
     return faces and float(np.abs(one.positions[order] - two.positions[other]).max()) <= slack
 
 
-def _improve(
-    body: Polyhedron, planning: command_flags.Planning, grasp: Grasp
-) -> tuple[Grasp, Moved]:
+def _improve(body: Polyhedron, planning: flags.Planning, grasp: Grasp) -> tuple[Grasp, Moved]:
     from grasp_core.optimizing.best_grasp import quality_ceiling
     from grasp_core.optimizing.better_contacts import optimize_contacts
 
@@ -142,7 +142,7 @@ def _improve(
 
 
 def with_regions(
-    body: Polyhedron, found: Plan, planning: command_flags.Planning, folder: Path | None, jobs: int,
+    body: Polyhedron, found: Plan, planning: flags.Planning, folder: Path | None, jobs: int,
     stop: Stop, reporter: Reporter,
 ) -> Plan:  # fmt: skip
     """Certify regions around a plan's contacts if asked for, and write the proofs to a folder."""
@@ -163,7 +163,7 @@ def with_regions(
     return replace(found, grasps=grasps, ended=stop.why if left else found.ended)
 
 
-def plan_file(command: command_flags.Plan, reporter: Reporter) -> int:
+def plan_file(command: flags.Plan, reporter: Reporter) -> int:
     """Plan grasps, write them to a file, and show the best of them."""
     wrenches, planning, failed = _task(command), command.planning, None
     body = object_to_plan(command.object, planning, reporter)
@@ -284,7 +284,7 @@ def say_ended(found: Plan, reporter: Reporter) -> int:
     return code
 
 
-def _task(command: command_flags.Plan) -> Array | None:
+def _task(command: flags.Plan) -> Array | None:
     """Return the wrenches of a task, (m, 6), if it is to be done well."""
     if not command.best and (command.measure != "ferrari-canny" or command.wrenches):
         raise FlagsError(

@@ -34,20 +34,16 @@ from grasp_core.regions.certify_regions import certify_regions
 from grasp_core.regions.proof import CertifiedRegions, TwistCover
 from grasp_core.stopping import Stop
 from grasp_core.values import FINGERS, ContactRegion, Grasp, four
-from sim_validate.kit import simulation_flags
-from sim_validate.kit.console import Reporter
-from sim_validate.kit.exit_codes import Exit
-from sim_validate.kit.files import (
-    AboutGrasps,
-    AboutObject,
-    alone_in,
-    read_arrays,
-    remove_results,
-    write_arrays,
-)
-from sim_validate.kit.own_faults import OWN_FAULTS
-from sim_validate.kit.workers import each
+from sim_validate.commands import simulation_flags
+from sim_validate.commands.console import Reporter
+from sim_validate.commands.exit_codes import Exit
+from sim_validate.files.array_files import read_arrays, write_arrays
+from sim_validate.files.output_folders import alone_in
+from sim_validate.files.result_files import AboutGrasps, AboutObject
+from sim_validate.files.results_folder import remove_results
 from sim_validate.planning.asked_objects import asked_grasps
+from sim_validate.processes.own_faults import OWN_FAULTS
+from sim_validate.processes.workers import each
 from sim_validate.settings import Certifying
 
 PROOFS = "proofs"

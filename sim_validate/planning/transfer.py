@@ -29,10 +29,12 @@ from grasp_core.transferring.transfer import (
     growth,
     transfer,
 )
-from sim_validate.kit import command_flags
-from sim_validate.kit.console import TABLE_ROWS, Reporter, say_cut
-from sim_validate.kit.exit_codes import Exit
-from sim_validate.kit.files import AboutObject, ResultFile, alone_in, remove_results
+from sim_validate.commands import flags
+from sim_validate.commands.console import TABLE_ROWS, Reporter, say_cut
+from sim_validate.commands.exit_codes import Exit
+from sim_validate.files.output_folders import alone_in
+from sim_validate.files.result_files import AboutObject, ResultFile
+from sim_validate.files.results_folder import remove_results
 from sim_validate.planning.asked_objects import asked_grasps, load_object
 
 ABSENT = "-"
@@ -59,7 +61,7 @@ class TransferFile(ResultFile):
         return cls(AboutObject.of(found.old), AboutObject.of(found.new), found)
 
 
-def transfer_file(command: command_flags.Transfer, reporter: Reporter) -> int:
+def transfer_file(command: flags.Transfer, reporter: Reporter) -> int:
     """Carry the grasps of a file over to a changed part, write them, and say what has changed."""
     saved = asked_grasps(command.grasps, reporter, friction=command.friction)
     if saved is None:
@@ -118,7 +120,7 @@ def carried_to_json(found: Transfer, saved: Plan) -> str:
     return plan_to_json(found.new, plan)
 
 
-def _changed_part(command: command_flags.Transfer, old: Polyhedron) -> Polyhedron:
+def _changed_part(command: flags.Transfer, old: Polyhedron) -> Polyhedron:
     center, part = command.center_of_mass_m, Path(command.part)
     choices = extended(MeshChoices, command.limits)
     if part.suffix or part.is_file():  # a built-in object is as it is
@@ -126,7 +128,7 @@ def _changed_part(command: command_flags.Transfer, old: Polyhedron) -> Polyhedro
         if center is None and (kept := same.pop("center_of_mass")) is not None:
             center = tuple(kept.tolist())
         choices = replace(choices, faces=same["faces"], largest_part=same["largest_part"])
-    mesh = command_flags.Mesh(command.lengths, choices, center_of_mass_m=center)
+    mesh = flags.Mesh(command.lengths, choices, center_of_mass_m=center)
     return load_object(command.part, mesh)
 
 

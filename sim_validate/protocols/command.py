@@ -9,13 +9,16 @@ from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach
 from grasp_core.planning.result import Plan
 from sim_validate.closure.command import prepared, simulate_grasps
+from sim_validate.commands import simulation_flags
+from sim_validate.commands.console import TABLE_ROWS, Reporter
+from sim_validate.commands.exit_codes import Exit
+from sim_validate.files.output_folders import alone_in
+from sim_validate.files.result_files import AboutObject
+from sim_validate.files.results_folder import remove_results
 from sim_validate.hands import flags as hand_flags
 from sim_validate.hands.command import reach_file
-from sim_validate.kit import simulation_flags, workers
-from sim_validate.kit.console import TABLE_ROWS, Reporter
-from sim_validate.kit.exit_codes import Exit
-from sim_validate.kit.files import AboutObject, alone_in, remove_results
 from sim_validate.planning.asked_objects import asked_grasps
+from sim_validate.processes import workers
 from sim_validate.protocols.judging import attempted, judge_hand_by
 from sim_validate.protocols.published import protocol
 from sim_validate.protocols.verdict import Judgement, Judgements

@@ -47,7 +47,7 @@ from sim_validate.engine.traces import Outcome, judge, rotation_angles
 from sim_validate.execution.execute import given_contacts
 from sim_validate.hands.dexgraspbench import RecordedReach, hand_file, recorded_postures
 from sim_validate.hands.trials import hand_setup, require_faithful_hands
-from sim_validate.kit.own_faults import OWN_FAULTS
+from sim_validate.processes.own_faults import OWN_FAULTS
 from sim_validate.protocols.published import PROTOCOLS, Passing, ProtocolRun, PublishedProtocol
 from sim_validate.protocols.verdict import Judgement, OurVerdict, RunVerdict
 

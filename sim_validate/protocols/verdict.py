@@ -11,7 +11,7 @@ from grasp_core.errors import InputError
 from grasp_core.figures import Shown
 from grasp_core.files.file_kinds import JUDGEMENTS
 from grasp_core.kinds import FLAT, Friction, Measured, Number, OrInfinity, Quantity
-from sim_validate.kit.files import AboutObject, ResultFile
+from sim_validate.files.result_files import AboutObject, ResultFile
 from sim_validate.protocols.published import PublishedProtocol
 
 

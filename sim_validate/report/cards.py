@@ -21,7 +21,7 @@ from sim_validate.closure.replaying import WantedTrial, of_verdict, replayed
 from sim_validate.closure.verdict import Verdict, Verdicts
 from sim_validate.execution.execute import ExecutionJob, film, worth_seeing
 from sim_validate.execution.verdict import Executions
-from sim_validate.kit.files import CLIPS, GRASP_PAGES, PICTURES
+from sim_validate.files.results_folder import CLIPS, GRASP_PAGES, PICTURES
 from sim_validate.report.charts import margin_panels, motion_panels, wrench_panels
 from sim_validate.report.run_folder import Findings, RunFolder, said_of_execution
 from sim_validate.report.sections import said_of_reach

@@ -28,12 +28,12 @@ from scenes.mujoco.closure_scene import Scene, build_scene, write_scene
 from scenes.mujoco.mjcf_text import IDENTITY_POSE
 from scenes.settings import FingerSettings
 from sim_validate.closure.replaying import Recorded, Replayed, WantedTrial, recorded_in, replayed
+from sim_validate.commands import flags
+from sim_validate.commands.console import Reporter
+from sim_validate.commands.exit_codes import Exit
 from sim_validate.datasets.open_dataset import MANIFEST, recorded_in_dataset
 from sim_validate.engine.setup import with_planned_radius
-from sim_validate.kit import command_flags
-from sim_validate.kit.console import Reporter
-from sim_validate.kit.exit_codes import Exit
-from sim_validate.kit.files import alone_in
+from sim_validate.files.output_folders import alone_in
 from sim_validate.planning.asked_objects import grasp_with_id
 from sim_validate.report.report import Report, write_report
 from sim_validate.report.run_folder import RunFolder, folder_of, reaches_beside
@@ -45,7 +45,7 @@ SWING_DEG, ELEVATION_DEG = 120.0, 25.0
 """Angle by which the camera moves around during a clip, and its elevation [deg]."""
 
 
-def view_grasp(command: command_flags.View, reporter: Reporter) -> int:
+def view_grasp(command: flags.View, reporter: Reporter) -> int:
     """Show a grasp in MuJoCo's viewer, or write it to the files that are asked for."""
     path = command.grasps / GRASPS if command.grasps.is_dir() else command.grasps
     saved = load_grasps(path)
@@ -120,7 +120,7 @@ def closing(scene: Scene) -> Array:
     return np.column_stack([np.tile(IDENTITY_POSE, (len(slides), 1)), slides])
 
 
-def report_folder(command: command_flags.Report, reporter: Reporter) -> int:
+def report_folder(command: flags.Report, reporter: Reporter) -> int:
     """Write the results of a run as pages, and print where they are."""
     at = command.out or folder_of(command.folder)
     with alone_in(at if command.out or at.is_dir() else None):
@@ -129,7 +129,7 @@ def report_folder(command: command_flags.Report, reporter: Reporter) -> int:
     return Exit.GOOD
 
 
-def shown_report(asked: command_flags.Report, reporter: Reporter) -> Report:
+def shown_report(asked: flags.Report, reporter: Reporter) -> Report:
     """Write the pages of a run, and say where they are."""
 
     def say_ready(index: Path, drawn: int, total: int) -> None:
@@ -158,7 +158,7 @@ SHOWN = 12
 """Number of rows of the motion that are shown; the trace file has all of them."""
 
 
-def replay_trial(command: command_flags.Replay, reporter: Reporter) -> int:
+def replay_trial(command: flags.Replay, reporter: Reporter) -> int:
     """Simulate a recorded trial again and compare its outcome with that in the file."""
     if command.trial is not None and command.control is not None:
         raise InputError(
@@ -206,7 +206,7 @@ def _show(recorded: Recorded, found: Replayed, said: str | None, reporter: Repor
     reporter.say(f"outcome: {ended} (the file says {said or 'nothing'}{by})")
 
 
-def _written(found: Replayed, command: command_flags.Replay, reporter: Reporter) -> Iterator[Path]:
+def _written(found: Replayed, command: flags.Replay, reporter: Reporter) -> Iterator[Path]:
     folder = command.out or Path()
     folder.mkdir(parents=True, exist_ok=True)
     yield write_scene(found.scene, folder / "scene.xml")

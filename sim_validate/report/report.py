@@ -35,9 +35,9 @@ from scenes.drawing.pages import (
 from scenes.drawing.pictures import Drawing
 from scenes.drawing.sheets import night_style, svg_of
 from sim_validate.closure.verdict import Verdict, WrenchVerdict
-from sim_validate.kit import files
-from sim_validate.kit.workers import available_cores, each
+from sim_validate.files import results_folder
 from sim_validate.planning.best import MEASURES, Best, Rated
+from sim_validate.processes.workers import available_cores, each
 from sim_validate.protocols.verdict import Totals
 from sim_validate.report import sections
 from sim_validate.report.cards import Card, Paged, cards_to_draw, draw, largest_push
@@ -124,7 +124,7 @@ def write_report(
             holds other files.
     """
     folder = folder_of(path_of(folder, "folder"))
-    out = folder / files.REPORT if out is None else path_of(out, "out")
+    out = folder / results_folder.REPORT if out is None else path_of(out, "out")
     for name, value in (("jobs", jobs), ("limit", limit)):
         if value is not None:
             value_of(Count, value, name)
@@ -132,20 +132,22 @@ def write_report(
     function(progress, "progress")
     function(ready, "ready")
     runs = tuple(run.first(limit) for run in runs_in(folder))
-    files.require_report_folder(out)
-    with files.new_pages(out) as place:
+    results_folder.require_report_folder(out)
+    with results_folder.new_pages(out) as place:
         cards = list(cards_to_draw(runs, clips))
         ready = ready if place == out else _nothing
         report = _written(cards, runs, place, jobs or available_cores(), progress, ready)
-    return replace(report, index=out / files.INDEX)
+    return replace(report, index=out / results_folder.INDEX)
 
 
 def _written(
     cards: Sequence[Card], runs: Sequence[RunFolder], out: Path, jobs: int,
     progress: Callable[[int, int], object], ready: Callable[[Path, int, int], object],
 ) -> Report:  # fmt: skip
-    for name in files.STATIC:
-        rules = f"{night_style()}\n" if name == files.STYLE else ""  # of charts on dark screens
+    for name in results_folder.STATIC:
+        rules = (
+            f"{night_style()}\n" if name == results_folder.STYLE else ""
+        )  # of charts on dark screens
         write_text(out / name, f"{text_of(name, ASSETS)}{rules}")
     for place, run in enumerate(runs):
         data = as_text(object_data(run.saved.body))
@@ -165,13 +167,13 @@ def _written(
         no_clip = no_clip or drawn.no_clip
         if len(shown) == next_index:
             waiting = len(cards) - len(shown)
-            index = write_text(out / files.INDEX, index_page(runs, shown, waiting))
+            index = write_text(out / results_folder.INDEX, index_page(runs, shown, waiting))
             if next_index == FIRST and waiting:
                 ready(index, len(shown), len(cards))
             next_index = min(2 * next_index, len(cards))
         progress(len(shown), len(cards))
     grasps = sum(1 + len(card.copies) for card in shown)
-    return Report(out / files.INDEX, grasps, no_clip, len(cards))
+    return Report(out / results_folder.INDEX, grasps, no_clip, len(cards))
 
 
 def grasp_page(

@@ -14,6 +14,8 @@ from grasp_core.files.records import record_of
 from grasp_core.messages import MILLI
 from grasp_core.names import HANDS
 from scenes.drawing.pages import Fact, number
+from sim_validate.commands.config_file import flags_from
+from sim_validate.commands.simulation_flags import Execute
 from sim_validate.execution.verdict import (
     ExecutedGrasp,
     ExecutionControl,
@@ -23,8 +25,6 @@ from sim_validate.execution.verdict import (
     totals_in_words,
 )
 from sim_validate.hands.flags import Reach
-from sim_validate.kit.flag_values import flags_from
-from sim_validate.kit.simulation_flags import Execute
 from sim_validate.report.run_folder import BAD, GOOD, QUIET, Findings, said_of_execution
 from sim_validate.settings import ExecutionSettings
 

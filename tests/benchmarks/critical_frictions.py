@@ -20,7 +20,7 @@ import scenes
 from sim_validate.engine.setup import Setup
 from sim_validate.engine.simulated_friction import released_friction
 from sim_validate.engine.stepping import Bench
-from sim_validate.kit.workers import available_cores, each
+from sim_validate.processes.workers import available_cores, each
 from tests.benchmarks.objects import FAMILIES
 
 WORST = 0.005

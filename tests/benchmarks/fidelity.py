@@ -31,7 +31,7 @@ from sim_validate.engine.simulated_friction import released_friction
 from sim_validate.engine.simulated_limits import bisected_limits, ramped_limits
 from sim_validate.engine.stepping import Bench
 from sim_validate.engine.traces import Outcome, judge
-from sim_validate.kit.workers import available_cores, each
+from sim_validate.processes.workers import available_cores, each
 from tests.benchmarks.objects import FAMILIES
 from tests.grasp_core.long_shapes import MM, with_holes
 

@@ -14,7 +14,7 @@ import numpy as np
 
 import grasp_core as gc
 import scenes
-from sim_validate.kit.workers import available_cores, each
+from sim_validate.processes.workers import available_cores, each
 from tests.judges import random_rotation
 
 OBJECTS = ("box", "prism", "hexagonal-pyramid", "wedge", "l-bracket", "octahedron", "random-8-3")

@@ -17,7 +17,7 @@ import grasp_core as gc
 import scenes
 from grasp_core.errors import UndecidedError
 from grasp_core.planning.result import FAMILIES
-from sim_validate.kit.workers import available_cores, each
+from sim_validate.processes.workers import available_cores, each
 
 OBJECTS = (
     "tetrahedron", "octahedron", "wedge", "box", "prism", "hexagonal-pyramid", "double-wedge-bar",

@@ -7,8 +7,8 @@ import shutil
 import pytest
 
 from grasp_core.files.text_files import UNFINISHED
-from sim_validate.kit.files import alone_in
-from sim_validate.kit.locks import LOCK
+from sim_validate.files.locks import LOCK
+from sim_validate.files.output_folders import alone_in
 from sim_validate.main import main
 from tests.faults.conftest import contents
 

@@ -5,8 +5,8 @@ import subprocess
 
 import pytest
 
-from sim_validate.kit import workers as engines
 from sim_validate.main import main
+from sim_validate.processes import workers as engines
 from tests.faults.conftest import CLI, KEPT, ROOT, contents
 
 RUN = ["run", "tetrahedron", "--limit", "1", "--jobs", "1", "-q"]

@@ -10,7 +10,7 @@ from pyarrow import parquet
 
 from sim_validate.datasets.columns import TABLES
 from sim_validate.datasets.parquet import parquet_bytes, read_columns
-from sim_validate.kit.files import arrays_of
+from sim_validate.files.array_files import arrays_of
 from sim_validate.planning.regions import ARRAYS, regions_of
 from tests.fuzzing.targets import MEMORY, Target
 

@@ -19,16 +19,16 @@ from sim_validate.baselines.baseline import Baseline
 from sim_validate.baselines.suite import suite_from_tables
 from sim_validate.closure.validate import validate
 from sim_validate.closure.verdict import Verdicts
+from sim_validate.commands.config_file import flags_from
+from sim_validate.commands.simulation_flags import Run
 from sim_validate.datasets.build import UnitRecord
 from sim_validate.datasets.config import DatasetConfig, config_to_toml
 from sim_validate.datasets.open_dataset import Listed, Manifest, left_out_from
 from sim_validate.datasets.work_units import given_from_json
 from sim_validate.engine.setup import Agenda, Setup, wrenches_from_json
 from sim_validate.execution.verdict import ExecutedGrasp, Executions
+from sim_validate.files.toml_files import tables_of_toml
 from sim_validate.hands.reaches import Reaches
-from sim_validate.kit.files import tables_of_toml
-from sim_validate.kit.flag_values import flags_from
-from sim_validate.kit.simulation_flags import Run
 from sim_validate.planning.regions import Regions
 from tests.fuzzing.targets import Target
 from tests.scenes.drawing.standing import reaches_text

@@ -6,8 +6,8 @@ from typing import get_args, get_origin
 
 from grasp_core.errors import InputError
 from grasp_core.kinds import value_of
-from sim_validate.kit.commands import COMMANDS
-from sim_validate.kit.flag_values import flags_of, parts_of
+from sim_validate.commands.flag_values import flags_of, parts_of
+from sim_validate.commands.table import COMMANDS
 
 
 def refuses(kind, value):

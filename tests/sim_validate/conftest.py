@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from sim_validate.kit.exit_codes import Exit
+from sim_validate.commands.exit_codes import Exit
 from sim_validate.main import main
 from tests.sim_validate.datasets import engines
 

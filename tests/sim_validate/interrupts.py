@@ -3,7 +3,7 @@
 import os
 import signal
 
-from sim_validate.kit.console import Steps
+from sim_validate.commands.console import Steps
 
 
 def interrupt_once(monkeypatch, title="planning"):

@@ -20,13 +20,13 @@ from scenes.drawing.painting import View
 from scenes.drawing.pictures import AZIMUTH_DEG, ELEVATION_DEG
 from scenes.example_objects import example_object
 from scenes.settings import ENDINGS, GraspFormat
+from sim_validate.commands.exit_codes import Exit
+from sim_validate.commands.flags import CLIPS, PAGES, PICTURES, ProtocolName
+from sim_validate.commands.table import EXAMPLES, GROUPS
 from sim_validate.datasets.config import HandName
 from sim_validate.engine.traces import HoldVerdict, Outcome
-from sim_validate.kit import workers
-from sim_validate.kit.command_flags import CLIPS, PAGES, PICTURES, ProtocolName
-from sim_validate.kit.commands import EXAMPLES, GROUPS
-from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
+from sim_validate.processes import workers
 from sim_validate.protocols.published import PROTOCOLS
 from tests.grasp_core.curved import bumpy_ellipsoid
 from tests.patience import HANGING_S
@@ -209,7 +209,7 @@ def test_graphics_that_are_not_here_are_named():
 def test_an_interrupted_run_keeps_what_is_done(here):
     """SIGINT while simulating: exit code 130, a whole grasps.json, verdicts marked incomplete."""
     code = (
-        "from sim_validate.kit import console; console.PLAIN_EVERY_S = 0.2;"
+        "from sim_validate.commands import console; console.PLAIN_EVERY_S = 0.2;"
         "from sim_validate.main import run_and_exit; run_and_exit()"
     )
     command = [sys.executable, "-c", code, "run", "icosahedron", "--limit", "150"]

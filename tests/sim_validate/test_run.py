@@ -6,7 +6,7 @@ import pytest
 
 import grasp_core as gc
 from sim_validate import run
-from sim_validate.kit.exit_codes import Exit
+from sim_validate.commands.exit_codes import Exit
 from sim_validate.main import main
 from tests.sim_validate.interrupts import interrupt_once
 

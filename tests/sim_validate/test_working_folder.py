@@ -4,8 +4,8 @@ import re
 
 import pytest
 
+from sim_validate.commands.exit_codes import Exit
 from sim_validate.engine.stepping import compiled
-from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
 from tests.scenes.meshes import box_obj
 from tests.three_fingers import THREE_TIPS, three_fingers_mjcf

@@ -6,8 +6,8 @@ import grasp_core as gc
 import scenes
 from grasp_core.errors import InputError
 from grasp_core.files.text_files import read_text, write_text
+from sim_validate.files.array_files import read_arrays
 from sim_validate.hands.dexgraspbench import load_dex_record
-from sim_validate.kit.files import read_arrays
 
 
 def test_a_file_is_replaced_as_a_whole(tmp_path):

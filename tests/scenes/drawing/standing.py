@@ -12,8 +12,8 @@ import scenes
 from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.hands.reach import HandReach
 from scenes.drawing.hands import posed_hand
+from sim_validate.files.result_files import AboutObject
 from sim_validate.hands.reaches import ReachedGrasp, Reaches, ReachSettings
-from sim_validate.kit.files import AboutObject
 
 FRICTION, CLEARANCE = 0.5, 5e-4
 GRASP = "c-0-1-4-5"

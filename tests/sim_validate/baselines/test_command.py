@@ -5,7 +5,7 @@ import shutil
 
 import pytest
 
-from sim_validate.kit.exit_codes import Exit
+from sim_validate.commands.exit_codes import Exit
 from sim_validate.main import main
 from tests.sim_validate.changing import at, changed
 from tests.sim_validate.rigs import saved_plan

@@ -9,7 +9,7 @@ from sim_validate.baselines.baseline import Baseline, Entry, How, VerdictFigures
 from sim_validate.baselines.compare import OTHER_VERSIONS, Carried, Status, compare, failing
 from sim_validate.engine.setup import Agenda, NamedWrench, Setup
 from sim_validate.engine.traces import Outcome
-from sim_validate.kit.files import AboutObject
+from sim_validate.files.result_files import AboutObject
 from sim_validate.settings import HoldProtocol
 
 FIGURES = VerdictFigures(

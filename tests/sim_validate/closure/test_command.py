@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from sim_validate.kit.exit_codes import Exit
+from sim_validate.commands.exit_codes import Exit
 from sim_validate.main import main
 
 TASK = '{"wrenches": [{"name": "lift", "force_n": [0, 0, -3], "torque_n_m": [0, 0.01, 0]}]}'

@@ -13,12 +13,12 @@ from scenes.settings import FingerSettings
 from sim_validate.closure import validate as validating
 from sim_validate.closure.controls import negative_controls
 from sim_validate.closure.verdict import Verdicts, trace_arrays
+from sim_validate.commands.exit_codes import Exit
 from sim_validate.engine.gate import ClosureCase
 from sim_validate.engine.known_cases import measured
 from sim_validate.engine.rig import Rig
 from sim_validate.engine.setup import Agenda, NamedWrench, Setup
 from sim_validate.engine.traces import Outcome
-from sim_validate.kit.exit_codes import Exit
 from tests.sim_validate.rigs import grasps, plan_with_a_bad_grasp
 
 WITHOUT_CONTROLS = Agenda(controls=False)
@@ -207,7 +207,7 @@ def test_contacts_rounded_to_six_digits_are_as_good():
 
 
 def test_workers_take_over_how_the_simulator_did(monkeypatch):
-    monkeypatch.setattr("sim_validate.kit.workers.UNITS_PER_PROCESS", 1)
+    monkeypatch.setattr("sim_validate.processes.workers.UNITS_PER_PROCESS", 1)
     body, found = grasps("wedge", 0.5, 2)
     asked = replace(WITHOUT_CONTROLS, critical_friction=False)
     gate = measured(ClosureCase.of(Setup(), 0.5, body.radius))
@@ -224,7 +224,7 @@ def test_workers_take_over_how_the_simulator_did(monkeypatch):
 
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_a_fingertip_that_meets_nothing_is_the_outcome_of_its_grasp_alone(jobs, monkeypatch):
-    monkeypatch.setattr("sim_validate.kit.workers.UNITS_PER_PROCESS", 1)
+    monkeypatch.setattr("sim_validate.processes.workers.UNITS_PER_PROCESS", 1)
     plan, agenda = plan_with_a_bad_grasp(), replace(WITHOUT_CONTROLS, limits="ramp", repeats=1)
     first, bad, last = sv.validate_all(plan.body, plan, 1.0, agenda=agenda, jobs=jobs)
     assert (first.held, bad.outcome, last.held) == (True, Outcome.INVALID_START, True)

@@ -8,7 +8,7 @@ import pytest
 
 import grasp_core as gc
 import sim_validate as sv
-from sim_validate.kit.exit_codes import Exit
+from sim_validate.commands.exit_codes import Exit
 from sim_validate.main import main
 from tests.sim_validate.changing import at, changed
 

@@ -11,12 +11,12 @@ import trimesh
 import grasp_core as gc
 import sim_validate
 from scenes.example_objects import example_object
+from sim_validate.commands.exit_codes import Exit
 from sim_validate.datasets import build as build_module
 from sim_validate.datasets import parquet
 from sim_validate.datasets.build import build
 from sim_validate.datasets.config import DatasetConfig, config_from_toml, config_to_toml
 from sim_validate.datasets.verify import verify
-from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
 from tests.sim_validate.datasets.configs import CONFIG, rows_of
 from tests.sim_validate.datasets.engines import Here, WorkerEndedError, contents, silent

@@ -9,9 +9,9 @@ import pytest
 import grasp_core as gc
 from grasp_core.processes import local_processes
 from sim_validate.datasets.build import Staging, build, do_unit, drive
+from sim_validate.datasets.clusters import dask_workers, ray_workers
 from sim_validate.datasets.config import DatasetConfig
 from sim_validate.datasets.work_units import units_of
-from sim_validate.kit.workers import dask_workers, ray_workers
 from tests.sim_validate.datasets.configs import CONFIG
 from tests.sim_validate.datasets.engines import contents, silent
 
@@ -95,7 +95,7 @@ def test_a_running_dask_cluster_is_used_and_several_threads_are_refused(dataset,
 
 @pytest.mark.parametrize("start", [dask_workers, ray_workers])
 def test_an_address_where_nothing_answers_is_said(start, monkeypatch):
-    monkeypatch.setattr("sim_validate.kit.workers.ANSWER_S", 1.0)
+    monkeypatch.setattr("sim_validate.datasets.clusters.ANSWER_S", 1.0)
     pytest.importorskip("ray" if start is ray_workers else "distributed")
     with pytest.raises(gc.InputError, match=r"no .* answers"), start(1, "127.0.0.1:1"):
         pass

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import sim_validate as sv
-from sim_validate.kit.exit_codes import Exit
+from sim_validate.commands.exit_codes import Exit
 from sim_validate.main import main
 from tests.sim_validate.datasets.engines import contents, here
 

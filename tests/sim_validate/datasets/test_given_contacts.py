@@ -9,11 +9,11 @@ import pytest
 import grasp_core as gc
 import sim_validate
 from scenes.example_objects import example_object
+from sim_validate.commands.exit_codes import Exit
 from sim_validate.datasets.build import build
 from sim_validate.datasets.config import DatasetConfig
 from sim_validate.datasets.verify import verify
 from sim_validate.datasets.work_units import read_given
-from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
 from tests.sim_validate.datasets.engines import Here, silent
 from tests.sim_validate.planning.test_analyze import contacts

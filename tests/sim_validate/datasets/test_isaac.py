@@ -12,11 +12,11 @@ import grasp_core as gc
 import sim_validate
 from grasp_core.files.text_files import UNFINISHED
 from grasp_core.objects.on_faces import nearest_on_surface
+from sim_validate.commands.exit_codes import Exit
 from sim_validate.datasets.config import SPLITS, SplitName
 from sim_validate.datasets.isaac import export
 from sim_validate.datasets.open_dataset import read_manifest, write_manifest
-from sim_validate.kit.exit_codes import Exit
-from sim_validate.kit.files import whole_folder
+from sim_validate.files.output_folders import whole_folder
 from sim_validate.main import main
 from tests.sim_validate.datasets.engines import contents, silent
 from tests.sim_validate.datasets.forging import forged

@@ -15,7 +15,7 @@ from sim_validate.execution.verdict import (
     ExecutionTrial,
     Skipped,
 )
-from sim_validate.kit.files import AboutObject
+from sim_validate.files.result_files import AboutObject
 
 SETTINGS = sv.ExecutionSettings(
     mass_kg=0.3, trials=("shake", "lift"), seed=7, shake_g=0.0, knock_n_s=0.02,

@@ -13,9 +13,9 @@ import sim_validate as sv
 from grasp_core.errors import UnfaithfulError
 from scenes.mujoco.fingertip_room import fitting_radius
 from sim_validate import run
+from sim_validate.commands.exit_codes import Exit
 from sim_validate.execution import execute as jobs
 from sim_validate.execution.execute import executed_grasp, execution_of
-from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
 
 QUICK = ["--trials", "knock"]

@@ -5,7 +5,7 @@ import pytest
 import grasp_core as gc
 import scenes
 from scenes.exports import ENDINGS
-from sim_validate.kit.exit_codes import Exit
+from sim_validate.commands.exit_codes import Exit
 from sim_validate.main import main
 
 

@@ -9,7 +9,7 @@ import pytest
 
 import grasp_core as gc
 import scenes
-from sim_validate.kit.exit_codes import Exit
+from sim_validate.commands.exit_codes import Exit
 from sim_validate.main import main
 from tests.scenes.mujoco.compiled import state_of
 

@@ -14,10 +14,10 @@ import sim_validate as sv
 from grasp_core.settings import as_table
 from scenes.example_objects import example_object
 from scenes.settings import SAMPLE_S
+from sim_validate.commands.config_file import flags_from
+from sim_validate.commands.simulation_flags import Execute
 from sim_validate.execution.paths import stop
 from sim_validate.hands.trials import hand_execution_settings
-from sim_validate.kit.flag_values import flags_from
-from sim_validate.kit.simulation_flags import Execute
 from sim_validate.settings import TRIAL_KINDS, TrialKind
 
 TABLE = {

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from sim_validate.kit.exit_codes import Exit
+from sim_validate.commands.exit_codes import Exit
 from sim_validate.main import main
 from tests.three_fingers import THREE_TIPS, three_fingers_file, three_fingers_mjcf
 

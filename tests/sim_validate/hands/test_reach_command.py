@@ -7,8 +7,8 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.files.file_kinds import REACHES
+from sim_validate.commands.exit_codes import Exit
 from sim_validate.hands.reaches import Reaches
-from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
 from tests.three_fingers import THREE_TIPS, three_fingers_file
 

@@ -10,7 +10,7 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.errors import UndecidedError
-from sim_validate.kit.exit_codes import Exit
+from sim_validate.commands.exit_codes import Exit
 from sim_validate.main import main
 from sim_validate.planning import analyze as analysis
 from tests.judges import TETRA_CENTERS, TETRA_NORMALS

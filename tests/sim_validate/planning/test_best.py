@@ -8,7 +8,7 @@ import pytest
 import grasp_core as gc
 from grasp_core.optimizing.support_cuts import read_proof
 from grasp_core.records.grasps_json import grasps_from_json
-from sim_validate.kit.exit_codes import Exit
+from sim_validate.commands.exit_codes import Exit
 from sim_validate.main import main
 from sim_validate.planning.best import Best
 from tests.sim_validate.interrupts import interrupt_once

@@ -8,8 +8,8 @@ import pytest
 import grasp_core as gc
 from grasp_core.objects.on_faces import nearest_edge
 from grasp_core.stopping import Stop
-from sim_validate.kit.console import Reporter
-from sim_validate.kit.exit_codes import Exit
+from sim_validate.commands.console import Reporter
+from sim_validate.commands.exit_codes import Exit
 from sim_validate.main import main
 from sim_validate.planning import plan as planning
 from sim_validate.planning.plan import say_counts

@@ -11,7 +11,7 @@ import sim_validate as sv
 from grasp_core.records.grasps_json import grasps_from_json
 from grasp_core.regions.proof import TwistCover
 from scenes.example_objects import example_object
-from sim_validate.kit.exit_codes import Exit
+from sim_validate.commands.exit_codes import Exit
 from sim_validate.main import main
 from sim_validate.planning.regions import Regions
 

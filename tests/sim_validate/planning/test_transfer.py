@@ -9,7 +9,7 @@ import grasp_core as gc
 from grasp_core.files.text_files import write_text
 from grasp_core.records.grasps_json import load_grasps
 from scenes.example_objects import example_object
-from sim_validate.kit.exit_codes import Exit
+from sim_validate.commands.exit_codes import Exit
 from sim_validate.main import main
 from tests.bad_input.mesh_texts import obj
 from tests.changed_parts import with_face_moved, with_hole

@@ -15,7 +15,7 @@ from scenes.example_objects import example_object
 from sim_validate.baselines.compare import Status
 from sim_validate.baselines.part import ChangedPartError, Source, source_of
 from sim_validate.baselines.suite import grasp_cases, suite_from_toml
-from sim_validate.kit.exit_codes import Exit
+from sim_validate.commands.exit_codes import Exit
 from sim_validate.main import main
 from tests.bad_input.mesh_texts import obj
 from tests.bad_input.of_threemf import mesh, model, object_, threemf

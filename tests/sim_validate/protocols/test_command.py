@@ -5,8 +5,8 @@ import shutil
 
 import pytest
 
+from sim_validate.commands.exit_codes import Exit
 from sim_validate.hands.dexgraspbench import load_dex_record
-from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
 from sim_validate.protocols.verdict import Judgements
 from tests.sim_validate.changing import at, changed

@@ -2,7 +2,7 @@
 
 import pytest
 
-from sim_validate.kit.exit_codes import Exit
+from sim_validate.commands.exit_codes import Exit
 from sim_validate.main import main
 from sim_validate.report import report as reports
 from sim_validate.report.cards import Drawn

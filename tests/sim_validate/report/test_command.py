@@ -10,7 +10,7 @@ import pytest
 
 import scenes
 from scenes.drawing import clips
-from sim_validate.kit.exit_codes import Exit
+from sim_validate.commands.exit_codes import Exit
 from sim_validate.main import main
 from sim_validate.report import command as view_command
 from sim_validate.report.command import COMING, closing

@@ -8,7 +8,7 @@ import pytest
 import sim_validate as sv
 from grasp_core.records.grasps_json import load_grasps
 from sim_validate.closure.verdict import Verdicts
-from sim_validate.kit.exit_codes import Exit
+from sim_validate.commands.exit_codes import Exit
 from sim_validate.main import main
 from sim_validate.report.cards import cards_of
 from sim_validate.report.report import FIRST, write_report

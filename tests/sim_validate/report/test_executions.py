@@ -14,6 +14,7 @@ from grasp_core.errors import InputError
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.records.grasps_json import load_grasps
 from scenes.mujoco_options import PhysicsSettings
+from sim_validate.commands.exit_codes import Exit
 from sim_validate.engine.traces import Outcome
 from sim_validate.execution.command import execution_settings
 from sim_validate.execution.verdict import (
@@ -23,8 +24,7 @@ from sim_validate.execution.verdict import (
     Skipped,
     load_executions,
 )
-from sim_validate.kit.exit_codes import Exit
-from sim_validate.kit.files import AboutObject
+from sim_validate.files.result_files import AboutObject
 from sim_validate.main import main
 from sim_validate.report import cards
 from sim_validate.report.report import write_report

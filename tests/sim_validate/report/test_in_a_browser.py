@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from sim_validate.kit.exit_codes import Exit
+from sim_validate.commands.exit_codes import Exit
 from sim_validate.main import main
 from sim_validate.report.report import write_report
 from tests.browser import (

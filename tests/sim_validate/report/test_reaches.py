@@ -7,7 +7,7 @@ import pytest
 
 from grasp_core.errors import InputError
 from scenes.drawing.sheets import FINGERS, HAND
-from sim_validate.kit.exit_codes import Exit
+from sim_validate.commands.exit_codes import Exit
 from sim_validate.main import main
 from sim_validate.report.report import write_report
 from tests.scenes.drawing.standing import (

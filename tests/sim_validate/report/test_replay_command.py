@@ -9,7 +9,7 @@ import pytest
 
 from grasp_core.provenance import versions
 from sim_validate.closure.verdict import Verdicts
-from sim_validate.kit.exit_codes import Exit
+from sim_validate.commands.exit_codes import Exit
 from sim_validate.main import main
 from tests.sim_validate.changing import slipped
 

@@ -13,7 +13,7 @@ import pytest
 from grasp_core.errors import InputError
 from grasp_core.records.grasps_json import load_grasps
 from sim_validate.closure.verdict import Verdicts
-from sim_validate.kit.exit_codes import Exit
+from sim_validate.commands.exit_codes import Exit
 from sim_validate.main import main
 from sim_validate.report.report import write_report
 from tests.scenes.drawing.whole import assert_contacts

@@ -1,10 +1,4 @@
-"""Runs units of work in processes of this machine, or on a Ray or Dask cluster.
-
-Results do not depend on the number of processes: a unit sees only its own arguments.
-
-Some compiled libraries clear errors that are not their own, keyboard interrupts too, and the
-program would run on: interrupts are noted, and raised again at the next step. A request to end
-(SIGTERM) counts as one.
+"""Runs units of work on a Ray or Dask cluster.
 
 Neither cluster repeats a unit by itself, because one place decides for all engines when to give up
 on a unit. Without `address`, Ray and Dask start workers on this machine and stop them afterwards.
@@ -12,132 +6,16 @@ on a unit. Without `address`, Ray and Dask start workers on this machine and sto
 
 import importlib
 import os
-import signal
 import socket
-import sys
-import threading
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping
 from concurrent.futures import Future
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from types import FrameType
-from typing import Any, TypeVar
+from typing import Any
 
 from grasp_core.errors import InputError
-from grasp_core.stopping import Stop
-
-Unit = TypeVar("Unit")
-Result = TypeVar("Result")
-
-SHARE = Path("/sys/fs/cgroup/cpu.max")
-"""The Linux file that limits a container's processor time: microseconds of use per period."""
-START_S = 1.0
-"""Time in which a process starts [s]; work that takes less is done without others."""
-UNITS_PER_PROCESS = 8
-"""Number of simulated grasps for which a process is better than threads of the simulator: its start
-takes as long as eight validations."""
-
-
-def available_cores() -> int:
-    """Count the cores that this process may use, limited by the share of its container."""
-    allowed: Callable[[int], set[int]] | None = getattr(os, "sched_getaffinity", None)  # on Linux
-    own = os.cpu_count() if allowed is None else len(allowed(0))
-    try:
-        share, period = SHARE.read_text().split()
-        return max(1, min(own or 1, int(share) // int(period)))
-    except (OSError, ValueError):  # not in a container, or in one without a limit
-        return own or 1
-
-
-def processes(units: int, jobs: int) -> int:
-    """Compute how many processes to use, at least one, where threads take the other cores."""
-    return max(1, min(jobs, units // UNITS_PER_PROCESS))
-
-
-def each(
-    function: Callable[[Unit], Result], units: Sequence[Unit], *, jobs: int,
-    stop: Callable[[], bool] | None = None,
-) -> Iterator[Result]:  # fmt: skip
-    """Yield the results of a function on each unit, in order, as they become ready.
-
-    What units have in common is sent once to each process if the function holds it. This process
-    works with the others, which start where there is work for them for longer than a
-    start takes. Results that other processes have not ready when `stop` says so are dropped.
-    """
-    # commands' flags count cores, and need not wait for this
-    from grasp_core.processes import local_processes
-
-    others = min(jobs, len(units)) - 1
-    if others < 1:
-        yield from map(function, units)
-        return
-    with local_processes(others, START_S) as workers:
-        yield from workers.in_order(function, units, ahead=len(units), stop=stop)
-
-
-SIGNALS = (signal.SIGINT, signal.SIGTERM)
-
-_noted = threading.Event()
-
-
-@contextmanager
-def interrupts_noted() -> Generator[None, None, None]:
-    """Record interrupts, besides raising them, while the context is open."""
-    if threading.current_thread() is not threading.main_thread():
-        yield  # Python handles signals in its main thread only
-        return
-    _noted.clear()
-    before = {number: signal.signal(number, _note) for number in SIGNALS}
-    told = sys.unraisablehook
-    # reports errors that cannot be raised where they occur, but interrupts, which are recorded
-    sys.unraisablehook = lambda e: None if e.exc_type is KeyboardInterrupt else told(e)
-    try:
-        yield
-    except Exception as error:
-        if _noted.is_set():
-            raise KeyboardInterrupt from error
-        raise
-    finally:
-        sys.unraisablehook = told
-        for number, handler in before.items():
-            signal.signal(number, handler)
-
-
-def _note(_: int, __: FrameType | None) -> None:
-    _noted.set()
-    raise KeyboardInterrupt
-
-
-@contextmanager
-def interrupts_end(stop: Stop) -> Generator[None, None, None]:
-    """Have the first interrupt end work in order, with what is done; the next one is raised."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = {number: signal.getsignal(number) for number in SIGNALS}
-
-    def note(_: int, __: FrameType | None) -> None:
-        stop.now()
-        for number, handler in before.items():
-            signal.signal(number, handler)
-
-    for number in before:
-        signal.signal(number, note)
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-
-
-def check_interrupted() -> None:
-    """Raise an interrupt that was recorded, where a library may have swallowed it."""
-    if _noted.is_set():
-        _noted.clear()
-        raise KeyboardInterrupt
-
 
 OBJECT_STORE_BYTES = 200 * 2**20
 """Size of the object store of a Ray started here; units and their rows go through files."""

@@ -8,14 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from sim_validate.kit.files import alone_in, whole_folder
-from sim_validate.kit.locks import LOCK, entries, locked
+from sim_validate.files.locks import LOCK, entries, locked
+from sim_validate.files.output_folders import alone_in, whole_folder
 
 ROOT = Path(__file__).parents[3]
 HELD = """
 import sys, time
 from pathlib import Path
-from sim_validate.kit.locks import locked
+from sim_validate.files.locks import locked
 
 with locked(Path(sys.argv[1])) as alone:
     print(alone, flush=True)

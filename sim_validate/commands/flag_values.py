@@ -1,24 +1,18 @@
 """Names of all flags of a command, and how lists and vectors are written on the command line.
 
 A list is written with commas, as in `--families pencil,regulus`, and a vector with spaces.
-
-A TOML file of settings becomes flags of an equivalent command line.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, is_dataclass
-from pathlib import Path
-from typing import Annotated, Any, Literal, cast, get_args, get_origin
+from typing import Annotated, Any, Literal, get_args, get_origin
 
 from tyro.conf import OmitArgPrefixes, UseAppendAction
 from tyro.constructors import ConstructorRegistry, PrimitiveConstructorSpec
 
-from grasp_core.errors import InputError
 from grasp_core.kinds import Vector
-from grasp_core.messages import near
 from grasp_core.settings import types
-from sim_validate.kit.command_flags import PLAIN
-from sim_validate.kit.exit_codes import FlagsError
+from sim_validate.commands.flags import PLAIN
 
 REGISTRY: Any = ConstructorRegistry()
 """How values of types that the parser of flags does not know are read."""
@@ -98,65 +92,3 @@ def _vector(info: Any) -> PrimitiveConstructorSpec[Any] | None:
         is_instance=lambda value: isinstance(value, tuple),
         str_from_instance=lambda value: [f"{part:g}" for part in value],
     )
-
-
-def with_config(words: list[str], path: Path | None, command: Any) -> list[str]:
-    """Put the settings of a TOML file before the flags, which then override them."""
-    if path is None:
-        return words
-    flags = _read(path, command)
-    first = next((place for place, word in enumerate(words) if word.startswith("-")), len(words))
-    return [*words[:first], *flags, *words[first:]]
-
-
-def flags_from(settings: Mapping[str, Any], command: Any) -> list[str]:
-    """Turn settings into the words of an equivalent command line; tables hold groups of flags."""
-    known = {flag.name: flag for flag in flags_of(command)}
-    words = list[str]()
-    for name, value in _named(settings):
-        flag = known.get(name.replace("-", "_"))
-        if flag is None:
-            meant = near(name.replace("-", "_"), known)
-            raise FlagsError(f"{name!r}: unknown flag; {meant or 'keys are long flags'}")
-        words += _as_flags(flag, value)
-    return words
-
-
-def _named(settings: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    for name, value in settings.items():
-        if isinstance(value, dict):
-            yield from _named(cast("dict[str, Any]", value), f"{prefix}{name}.")
-        else:
-            yield prefix + name, value
-
-
-def _read(path: Path, command: Any) -> list[str]:
-    """Read a file of settings as words of a command line."""
-    # imported only when there is a file to read
-    from sim_validate.kit.files import read_tables
-
-    try:
-        settings = read_tables(path)
-    except InputError as error:
-        raise InputError(f"--config {error}") from error
-    try:
-        return flags_from(settings, command)
-    except InputError as error:
-        raise type(error)(f"--config {path}: {error}") from None
-
-
-def _as_flags(flag: Flag, value: Any) -> list[str]:
-    word, items = "--" + flag.name.replace("_", "-"), _items(value)
-    if any(isinstance(part, dict) for item in items for part in _items(item)):
-        raise InputError(f"{flag.name}: expected a value or a list, got a table")
-    if isinstance(value, bool):
-        return [word] if value else []
-    if listed(flag.kind) is not None:
-        return [word, ",".join(map(str, items))]
-    if UseAppendAction in get_args(flag.kind)[1:]:
-        return [part for item in items for part in (word, *map(str, _items(item)))]
-    return [word, *map(str, items)]
-
-
-def _items(value: Any) -> Sequence[Any]:
-    return cast("Sequence[Any]", value) if isinstance(value, list | tuple) else [value]

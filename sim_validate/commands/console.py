@@ -22,7 +22,7 @@ from grasp_core.files.json_text import text_of
 from grasp_core.files.records import RecordFile
 from grasp_core.files.text_files import write_text
 from grasp_core.stopping import never, until
-from sim_validate.kit.workers import check_interrupted
+from sim_validate.processes.interrupts import check_interrupted
 
 Result = TypeVar("Result")
 File = TypeVar("File", bound=RecordFile)

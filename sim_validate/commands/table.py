@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from sim_validate.kit.exit_codes import FlagsError
+from sim_validate.commands.exit_codes import FlagsError
 
 
 class Command(NamedTuple):
@@ -20,56 +20,56 @@ class Command(NamedTuple):
 
 COMMANDS: Mapping[str, Command] = {
     "run": Command(
-        "kit.simulation_flags:Run", "run:run_object",
+        "commands.simulation_flags:Run", "run:run_object",
         "Plan grasps, simulate them and negative controls (contacts that must fail); write all.",
     ),
     "plan": Command(
-        "kit.command_flags:Plan", "planning.plan:plan_file",
+        "commands.flags:Plan", "planning.plan:plan_file",
         "Find force-closure grasps of an object, each with a checked certificate of force "
         "closure.",
     ),
     "validate": Command(
-        "kit.simulation_flags:Validate", "protocols.command:validate_file",
+        "commands.simulation_flags:Validate", "protocols.command:validate_file",
         "Simulate the grasps of a file in MuJoCo, with negative controls: contacts that must "
         "fail.",
     ),
     "execute": Command(
-        "kit.simulation_flags:Execute", "execution.command:execute_file",
+        "commands.simulation_flags:Execute", "execution.command:execute_file",
         "Simulate grasps as a robot executes them: true mass, springy fingers, one fixed squeeze.",
     ),
     "scene": Command(
-        "kit.simulation_flags:Scene", "execution.command:write_scenes",
+        "commands.simulation_flags:Scene", "execution.command:write_scenes",
         "Write grasps as MuJoCo scenes, which MuJoCo's own viewer can open.\n\n"
         "Without a mass, the scenes are those of `validate`: masses are scaled to suit the grasp, "
         "and there is no gravity. With a mass or a density, objects have their true mass and are "
         "held under gravity, as in the command `execute`.",
     ),
     "export": Command(
-        "kit.simulation_flags:Export", "execution.command:export_grasps",
+        "commands.simulation_flags:Export", "execution.command:export_grasps",
         "Write grasps for other programs: MoveIt, or viewers and editors of 3D scenes.",
     ),
     "view": Command(
-        "kit.command_flags:View", "report.command:view_grasp",
+        "commands.flags:View", "report.command:view_grasp",
         "Look at a grasp: in MuJoCo's viewer if there is a display, or in a file.",
     ),
     "report": Command(
-        "kit.command_flags:Report", "report.command:report_folder",
+        "commands.flags:Report", "report.command:report_folder",
         "Write the results of a run as pages that open in a browser, without any network.",
     ),
     "regions": Command(
-        "kit.simulation_flags:Regions", "planning.regions:certify_file",
+        "commands.simulation_flags:Regions", "planning.regions:certify_file",
         "Prove regions in which each finger may stand anywhere, whatever the others do.",
     ),
     "replay": Command(
-        "kit.command_flags:Replay", "report.command:replay_trial",
+        "commands.flags:Replay", "report.command:replay_trial",
         "Simulate one recorded trial again, and write its motion, sample by sample, and a clip.",
     ),
     "analyze": Command(
-        "kit.command_flags:Analyze", "planning.analyze:analyze_file",
+        "commands.flags:Analyze", "planning.analyze:analyze_file",
         "Judge contacts of any origin: force closure with a certificate, quality, wrench limits.",
     ),
     "transfer": Command(
-        "kit.command_flags:Transfer", "planning.transfer:transfer_file",
+        "commands.flags:Transfer", "planning.transfer:transfer_file",
         "Carry grasps over to a part that has changed since they were planned, and judge them "
         "anew.",
     ),
@@ -106,19 +106,19 @@ COMMANDS: Mapping[str, Command] = {
         "Simulate the grasps of a baseline again, and report how each result has changed.",
     ),
     "inspect": Command(
-        "kit.command_flags:Inspect", "planning.objects:inspect_object",
+        "commands.flags:Inspect", "planning.objects:inspect_object",
         "Show a mesh as a polyhedron: faces, mass properties, face quadruples to grasp by.",
     ),
     "objects": Command(
-        "kit.command_flags:Objects", "planning.objects:list_objects",
+        "commands.flags:Objects", "planning.objects:list_objects",
         "List the names of the built-in objects.",
     ),
     "schema": Command(
-        "kit.flags:Schema", "kit.command:show_schema",
+        "schemas.flags:Schema", "schemas.command:show_schema",
         "Print the JSON Schema of a kind of files, or list the kinds of files.",
     ),
     "doctor": Command(
-        "kit.command_flags:Doctor", "closure.command:check_installation",
+        "commands.flags:Doctor", "closure.command:check_installation",
         "Check this installation: versions, solvers and simulator.",
     ),
 }  # fmt: skip

@@ -1,9 +1,9 @@
 """Runs the command `schema`, which prints what files may hold."""
 
-from sim_validate.kit.console import Reporter
-from sim_validate.kit.exit_codes import Exit
-from sim_validate.kit.flags import Schema
-from sim_validate.kit.schemas import KINDS, named, schema_text
+from sim_validate.commands.console import Reporter
+from sim_validate.commands.exit_codes import Exit
+from sim_validate.schemas.file_schemas import KINDS, named, schema_text
+from sim_validate.schemas.flags import Schema
 
 
 def show_schema(command: Schema, reporter: Reporter) -> int:

@@ -1,6 +1,6 @@
 """The flags of commands that simulate grasps, prove regions around contacts, or write scenes.
 
-They are apart from `command_flags`, so that other commands need not import the settings of all
+They are apart from `flags`, so that other commands need not import the settings of all
 this. This module imports nothing that is slow to load, so that help and usage errors answer at
 once.
 """
@@ -16,7 +16,7 @@ from grasp_core.declared import declared
 from grasp_core.kinds import Direction, Quantity, Seed, TimeLimit
 from grasp_core.settings import Settings
 from scenes.settings import ENDINGS, GraspFormat, ScaledScene
-from sim_validate.kit.command_flags import (
+from sim_validate.commands.flags import (
     PLAIN,
     AtFriction,
     FirstOnly,
@@ -29,7 +29,7 @@ from sim_validate.kit.command_flags import (
     ProtocolName,
     Spoken,
 )
-from sim_validate.kit.workers import available_cores
+from sim_validate.processes.workers import available_cores
 from sim_validate.settings import Certifying, ChosenExecution, ChosenTrials, Holding
 
 RUN_LIMIT = 100

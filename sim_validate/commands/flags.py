@@ -32,7 +32,7 @@ from grasp_core.names import RANKINGS, MeasureName, RankBy
 from grasp_core.planning.settings import PlanSettings
 from grasp_core.settings import Settings
 from grasp_core.transferring.settings import Carrying
-from sim_validate.kit.workers import available_cores
+from sim_validate.processes.workers import available_cores
 
 Positive = Annotated[float, Interval(gt=0.0)]
 Jobs = Annotated[Count, arg(help="Largest number of processes; results do not depend on it.")]

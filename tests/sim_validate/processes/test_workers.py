@@ -9,13 +9,14 @@ from types import SimpleNamespace
 
 import pytest
 
-from sim_validate.kit import compiling
-from sim_validate.kit import workers as clusters
-from sim_validate.kit.console import Reporter
-from sim_validate.kit.exit_codes import Exit
-from sim_validate.kit.workers import check_interrupted, each, interrupts_noted
+from sim_validate.commands.console import Reporter
+from sim_validate.commands.exit_codes import Exit
+from sim_validate.datasets import clusters
 from sim_validate.main import main
 from sim_validate.planning import plan as plan_command
+from sim_validate.processes import compiling
+from sim_validate.processes.interrupts import check_interrupted, interrupts_noted
+from sim_validate.processes.workers import each
 from tests.grasp_core.tasks_to_do import meet
 from tests.patience import HANGING_S
 
@@ -40,7 +41,7 @@ import os, sys
 import sim_validate as sv
 from scenes import example_object
 import grasp_core as gc
-from sim_validate.kit import workers
+from sim_validate.processes import workers
 
 print("begun")
 workers.UNITS_PER_PROCESS, workers.START_S = 1, 0.0

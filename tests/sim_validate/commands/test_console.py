@@ -5,8 +5,8 @@ from threading import Event
 import pytest
 from rich.console import Console
 
-from sim_validate.kit import console
-from sim_validate.kit.console import Reporter, duration
+from sim_validate.commands import console
+from sim_validate.commands.console import Reporter, duration
 
 COLUMNS = ("grasp", *(f"column {place}" for place in range(9)))
 ROWS = [(f"c-{row}", *(f"{row}1.{place}7/12.34" for place in range(9))) for row in range(3)]

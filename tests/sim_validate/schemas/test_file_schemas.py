@@ -13,12 +13,12 @@ from grasp_core.figures import meanings
 from grasp_core.files import file_kinds
 from grasp_core.records.grasps_json import ContactSet
 from sim_validate.baselines.suite import suite_from_tables
+from sim_validate.commands.console import Reporter
 from sim_validate.datasets.config import DatasetConfig, config_from_toml, config_to_toml
-from sim_validate.kit.command import show_schema
-from sim_validate.kit.console import Reporter
-from sim_validate.kit.flags import Schema
-from sim_validate.kit.schemas import DRAFT, KINDS, address, named, schema_of
 from sim_validate.main import main
+from sim_validate.schemas.command import show_schema
+from sim_validate.schemas.file_schemas import DRAFT, KINDS, address, named, schema_of
+from sim_validate.schemas.flags import Schema
 from tests.damaged import damaged
 from tests.fuzzing.data_files import TARGETS
 from tests.schemas import faults_of, faults_of_file

@@ -22,7 +22,7 @@ from grasp_core.planning.planner import plan
 from grasp_core.quality.ferrari_canny import ferrari_canny
 from grasp_core.solvers.qp import least_distance
 from scenes.example_objects import example_object
-from sim_validate.kit.workers import each
+from sim_validate.processes.workers import each
 
 OUTWARD = np.array([[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]])
 """Outward directions of a tetrahedron's faces, (4, 3); a third of each is its face's middle [m]."""

@@ -3,7 +3,7 @@
 from tyro.conf import Positional
 
 from grasp_core.declared import declared
-from sim_validate.kit.command_flags import Spoken
+from sim_validate.commands.flags import Spoken
 
 
 @declared

@@ -13,16 +13,11 @@ import grasp_core as gc
 from grasp_core.files.file_kinds import BESIDE, GRASPS
 from grasp_core.files.json_text import object_of
 from grasp_core.files.text_files import read_bytes, read_text
-from sim_validate.kit import files
-from sim_validate.kit.exit_codes import Exit
-from sim_validate.kit.files import (
-    MOST_LETTERS,
-    arrays_of,
-    path_inside,
-    read_tables,
-    require_inside,
-    tables_of_toml,
-)
+from sim_validate.commands.exit_codes import Exit
+from sim_validate.files import array_files
+from sim_validate.files.array_files import arrays_of
+from sim_validate.files.named_paths import path_inside, require_inside
+from sim_validate.files.toml_files import MOST_LETTERS, read_tables, tables_of_toml
 from sim_validate.main import main
 
 
@@ -148,7 +143,7 @@ def test_archives_that_lie_are_refused(case):
 
 
 def test_a_bomb_is_refused_by_what_it_claims_before_it_is_inflated(monkeypatch):
-    monkeypatch.setattr(files, "MOST_BYTES", 2**22)
+    monkeypatch.setattr(array_files, "MOST_BYTES", 2**22)
     bomb = _archive(*((f"{i}.npy", b"\0" * 2**20) for i in range(5)))
     assert len(bomb) < 2**14
     with pytest.raises(gc.InputError, match="the arrays of the npz file take"):

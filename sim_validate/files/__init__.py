@@ -1,0 +1,1 @@
+"""How are files of results written whole, locked, read and replaced?"""

@@ -1,0 +1,64 @@
+"""Reads tables of TOML files."""
+
+import re
+import tomllib
+from datetime import date, time
+from pathlib import Path
+from typing import Any, cast
+
+from grasp_core.errors import InputError, about
+from grasp_core.files.text_files import (
+    read_text,
+)
+from grasp_core.messages import at
+
+MOST_LETTERS = 2**20
+"""Largest number of characters of a settings file, which is usually short."""
+MOST_SAID = 200
+"""Largest number of characters of what the parser says of a text."""
+ASIDE = re.compile(
+    r'''"""(?:[^\\]|\\.)*?(?:"""|\\?\Z)|"(?:[^"\\\n]|\\.)*(?:"|\n|\\?\Z)|'''
+    r"""'''.*?(?:'''|\Z)|'[^'\n]*(?:'|\n|\Z)|\#[^\n]*""",
+    re.DOTALL,
+)
+"""Pattern of quoted text and comments, in which dots are no key separators."""
+DEEPEST = 64
+"""Largest number of parts of a key."""
+LONG_KEY = re.compile(rf"(?<![\w-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{DEEPEST}}}")
+"""Pattern of a key `a.b.c` with too many parts. The time of tomllib grows with the cube of their
+number: two minutes for a hundred kilobytes."""
+
+
+def read_tables(path: Path) -> dict[str, Any]:
+    """Read the tables of a TOML file."""
+    text = read_text(path, MOST_LETTERS)
+    with about(path):
+        return tables_of_toml(text)
+
+
+def tables_of_toml(text: str) -> dict[str, Any]:
+    """Parse the tables of a TOML text."""
+    if LONG_KEY.search(ASIDE.sub(lambda found: "q" if found[0][0] != "#" else "", text)):
+        raise InputError(f"a key of the TOML file has more than {DEEPEST} parts; use shorter keys")
+    try:
+        found = tomllib.loads(text)
+    except RecursionError as error:
+        raise InputError(
+            "values of the TOML file are nested too deeply; use fewer levels"
+        ) from error
+    except ValueError as error:  # numbers of thousands of digits and days that do not exist, too
+        raise InputError(f"the text is not TOML: {str(error)[:MOST_SAID]}") from error
+    _check_no_dates(found)
+    return found
+
+
+def _check_no_dates(found: Any, where: str = "") -> None:
+    """Refuse days and times of TOML, which no setting is."""
+    if isinstance(found, date | time):
+        raise InputError(f"{where}: expected a number or text, got {found}; put it in quotes")
+    if isinstance(found, dict):
+        for name, each in cast("dict[str, Any]", found).items():
+            _check_no_dates(each, at(where, name))
+    elif isinstance(found, list):
+        for place, each in enumerate(cast("list[Any]", found)):
+            _check_no_dates(each, f"{where}[{place}]")
