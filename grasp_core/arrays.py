@@ -17,8 +17,8 @@ from annotated_types import Interval
 from numpy.typing import ArrayLike, NDArray
 from pydantic_core import CoreSchema, core_schema
 
+from grasp_core.allowed_values import LARGEST_FRICTION, MOST_COUNT
 from grasp_core.errors import InputError
-from grasp_core.kinds import LARGEST_FRICTION, MOST_COUNT
 from grasp_core.messages import UnfitError, shown
 
 Array: TypeAlias = NDArray[np.float64]

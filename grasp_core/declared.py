@@ -7,7 +7,7 @@
         normal: UnitVector
         \"\"\"Unit vector into the object.\"\"\"
 
-The constructor checks each field by its type (see `kinds`) and keeps it in plain form: arrays
+The constructor checks each field by its type (see `allowed_values`) and keeps it in plain form: arrays
 copied and read-only. `is_sound` checks a value again that may come from anywhere.
 """
 
@@ -21,9 +21,9 @@ from pydantic import ConfigDict, GetCoreSchemaHandler, ValidationError
 from pydantic.dataclasses import dataclass
 from pydantic_core import ArgsKwargs, CoreSchema, core_schema
 
+from grasp_core.allowed_values import FLAT, adapter, bare, input_error, rules, strictly
 from grasp_core.by_value import ByValue, is_array, same
 from grasp_core.errors import InputError
-from grasp_core.kinds import FLAT, adapter, bare, input_error, rules, strictly
 from grasp_core.messages import FieldError
 
 Item = TypeVar("Item")

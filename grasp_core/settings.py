@@ -14,9 +14,9 @@ from dataclasses import MISSING, fields, replace
 from textwrap import shorten
 from typing import Any, Self, TypeVar, cast, get_args
 
+from grasp_core.allowed_values import inside
 from grasp_core.declared import Declared, default_of, types
 from grasp_core.errors import InputError
-from grasp_core.kinds import inside
 from grasp_core.messages import FieldError, at, shown
 
 Given = TypeVar("Given", bound="Settings")

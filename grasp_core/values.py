@@ -13,6 +13,7 @@ import numpy as np
 from annotated_types import Interval
 from pydantic import Field, computed_field
 
+from grasp_core.allowed_values import NotNegative, Null, Number, Signed, value_of
 from grasp_core.arrays import Array, Shape, UnitVector, UnitVectors
 from grasp_core.by_value import counted, summary, vector
 from grasp_core.declared import Declared, declared
@@ -20,7 +21,6 @@ from grasp_core.errors import InputError
 from grasp_core.figures import Shown
 from grasp_core.files.records import UNRECORDED
 from grasp_core.frames import poses_along
-from grasp_core.kinds import NotNegative, Null, Number, Signed, value_of
 from grasp_core.messages import FieldError, shown
 from grasp_core.names import Family
 

@@ -14,9 +14,9 @@ from itertools import product
 
 import numpy as np
 
+from grasp_core.allowed_values import value_of
 from grasp_core.arrays import Array
 from grasp_core.errors import InputError
-from grasp_core.kinds import value_of
 from grasp_core.messages import near, shown
 from grasp_core.objects.booleans import Solid, extrusion, hull
 from grasp_core.objects.polyhedron import Polyhedron

@@ -7,10 +7,10 @@ from typing import Any, get_args
 
 import numpy as np
 
+from grasp_core.allowed_values import SMALLEST, instance, number, one_of, path_of
 from grasp_core.errors import InputError
 from grasp_core.files.text_files import write_parts
 from grasp_core.frames import poses_along
-from grasp_core.kinds import SMALLEST, instance, number, one_of, path_of
 from grasp_core.planning.result import Plan
 from grasp_core.values import Grasp
 from scenes.drawing import sheets

@@ -8,9 +8,9 @@ from typing import Annotated, Any, Literal
 
 from annotated_types import Interval
 
+from grasp_core.allowed_values import LARGEST, NotNegative, Quantity, Share
 from grasp_core.declared import declared
 from grasp_core.errors import InputError
-from grasp_core.kinds import LARGEST, NotNegative, Quantity, Share
 from grasp_core.settings import Settings
 
 MOST_ITERATIONS = 10_000

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Literal, Self, TypeAlias
 
 from annotated_types import Interval
 
+from grasp_core.allowed_values import Direction, Quantity
 from grasp_core.declared import declared, default_of
 from grasp_core.errors import InputError
-from grasp_core.kinds import Direction, Quantity
 from grasp_core.settings import CHOSEN, Settings
 from grasp_core.small_objects import fitted
 from scenes.mujoco_options import HARD_TIPS, Softness

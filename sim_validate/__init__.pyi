@@ -7,10 +7,10 @@ from sim_validate.closure.verdict import Verdict as Verdict
 from sim_validate.closure.verdict import Verdicts as Verdicts
 from sim_validate.closure.verdict import load_verdicts as load_verdicts
 from sim_validate.datasets.open_dataset import load_dataset as load_dataset
+from sim_validate.engine.held_or_let_go import Outcome as Outcome
 from sim_validate.engine.setup import Agenda as Agenda
 from sim_validate.engine.setup import NamedWrench as NamedWrench
 from sim_validate.engine.setup import Setup as Setup
-from sim_validate.engine.traces import Outcome as Outcome
 from sim_validate.execution.execute import execute as execute
 from sim_validate.execution.verdict import ExecutedGrasp as ExecutedGrasp
 from sim_validate.execution.verdict import Execution as Execution

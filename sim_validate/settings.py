@@ -11,9 +11,7 @@ from typing import Annotated, Literal, Self, TypeAlias, get_args
 
 from annotated_types import Interval
 
-from grasp_core.declared import declared
-from grasp_core.errors import InputError
-from grasp_core.kinds import (
+from grasp_core.allowed_values import (
     MaxCones,
     NotNegative,
     Quantity,
@@ -23,6 +21,8 @@ from grasp_core.kinds import (
     Seed,
     Share,
 )
+from grasp_core.declared import declared
+from grasp_core.errors import InputError
 from grasp_core.messages import FieldError
 from grasp_core.settings import Settings
 from scenes.settings import SAMPLE_S, HeldSettings

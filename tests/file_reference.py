@@ -9,10 +9,10 @@ import re
 from pathlib import Path
 from typing import Any, NamedTuple, get_args
 
+from grasp_core.allowed_values import inside, words
 from grasp_core.declared import Declared
 from grasp_core.figures import meanings
 from grasp_core.files.records import entries
-from grasp_core.kinds import inside, words
 from grasp_core.names import RANKINGS
 from grasp_core.settings import Settings
 from sim_validate.closure.verdict import Verdicts

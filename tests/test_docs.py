@@ -20,8 +20,8 @@ from sim_validate import main as commands
 from sim_validate.commands.exit_codes import Exit
 from sim_validate.datasets.config import DatasetConfig, Learning, config_from_toml
 from sim_validate.datasets.given_grasps import read_given
+from sim_validate.engine.held_or_let_go import Outcome
 from sim_validate.engine.setup import Setup, setup_from_file, wrenches_from_file
-from sim_validate.engine.traces import Outcome
 from sim_validate.execution.verdict import Fate
 from sim_validate.main import main
 from sim_validate.settings import TRIAL_KINDS, ChosenExecution

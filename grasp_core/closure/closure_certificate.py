@@ -10,6 +10,7 @@ from typing import Annotated
 
 import numpy as np
 
+from grasp_core.allowed_values import LARGEST
 from grasp_core.arrays import (
     SMALLEST_SIZE,
     Array,
@@ -23,7 +24,6 @@ from grasp_core.arrays import (
 from grasp_core.closure.contacts import normal_and_tangential, to_center, torsion_lengths, unit_size
 from grasp_core.closure.proofs import ContactCones, margin_ceiling, proved_margin
 from grasp_core.declared import Declared, declared
-from grasp_core.kinds import LARGEST
 
 SUMMED = 1e-9
 """Error that closing forces may have: in the sum of their normal parts, which is 1, and in their

@@ -14,6 +14,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
+from grasp_core.allowed_values import LARGEST, LARGEST_FRICTION, instance, several
 from grasp_core.arrays import (
     SMALLEST_SIZE,
     Array,
@@ -25,7 +26,6 @@ from grasp_core.arrays import (
 )
 from grasp_core.errors import InputError
 from grasp_core.frames import plane_tangents
-from grasp_core.kinds import LARGEST, LARGEST_FRICTION, instance, several
 from grasp_core.messages import shown
 from grasp_core.values import FINGERS, Contact, Grasp
 

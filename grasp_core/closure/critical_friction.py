@@ -58,6 +58,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from grasp_core.allowed_values import LARGEST_FRICTION
 from grasp_core.arrays import Array, cross
 from grasp_core.closure.contacts import (
     WRENCH,
@@ -95,7 +96,6 @@ from grasp_core.closure.proofs import (
 )
 from grasp_core.compiled import compiled
 from grasp_core.errors import SolverError
-from grasp_core.kinds import LARGEST_FRICTION
 from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
 from grasp_core.values import Contact, Grasp
 

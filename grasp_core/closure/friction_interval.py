@@ -30,6 +30,7 @@ import numpy as np
 from annotated_types import Interval
 from numpy.typing import NDArray
 
+from grasp_core.allowed_values import LARGEST_FRICTION
 from grasp_core.arrays import Array, Indices, Points, UnitVectors, Wrench, cross
 from grasp_core.closure.contacts import (
     LEAST_CONTACTS,
@@ -39,7 +40,6 @@ from grasp_core.closure.contacts import (
     unit_size,
 )
 from grasp_core.declared import Declared, declared
-from grasp_core.kinds import LARGEST_FRICTION
 
 Whole: TypeAlias = NDArray[np.object_]
 """Whole numbers of any size: numerators over a denominator that all share."""

@@ -27,6 +27,7 @@ from typing import Annotated, Literal, Self, TypeAlias, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
+from grasp_core.allowed_values import Quantity, one_of, value_of
 from grasp_core.arrays import Array, Frictions, Shape, frozen
 from grasp_core.closure.contacts import (
     LOCAL,
@@ -40,7 +41,6 @@ from grasp_core.closure.contacts import (
 from grasp_core.closure.proofs import ContactCones
 from grasp_core.declared import Declared, declared, trusted
 from grasp_core.errors import InputError
-from grasp_core.kinds import Quantity, one_of, value_of
 from grasp_core.messages import shown
 from grasp_core.solvers.conic import ConicProgram, minimize
 from grasp_core.solvers.ties import on_grid

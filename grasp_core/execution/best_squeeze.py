@@ -22,6 +22,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from grasp_core.allowed_values import Quantity, instance, value_of
 from grasp_core.arrays import Array
 from grasp_core.closure.contacts import WRENCH
 from grasp_core.errors import NoForcesError, SolverError
@@ -35,7 +36,6 @@ from grasp_core.execution.squeeze_certificate import (
     Survival,
     no_scale,
 )
-from grasp_core.kinds import Quantity, instance, value_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
 from grasp_core.solvers.lp import LinearProgram, Optimum, maximize

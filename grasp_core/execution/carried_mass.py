@@ -86,6 +86,7 @@ import numpy as np
 from annotated_types import Interval
 from numpy.typing import ArrayLike
 
+from grasp_core.allowed_values import SMALLEST, Quantity, number, value_of
 from grasp_core.arrays import (
     SHIFT,
     Amount,
@@ -107,7 +108,6 @@ from grasp_core.execution.best_squeeze import searched
 from grasp_core.execution.grips import STIFFNESS_N_PER_M, TIP_RADIUS_M, Bounded, Grip, unsqueezed
 from grasp_core.execution.loads import GRAVITY_M_PER_S2, any_direction
 from grasp_core.execution.squeeze_certificate import BestSqueeze
-from grasp_core.kinds import SMALLEST, Quantity, number, value_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.ferrari_canny import InnerPolytope
 from grasp_core.quality.motors import Motors, motors_for

@@ -37,13 +37,13 @@ from typing import Literal, TypeAlias, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
+from grasp_core.allowed_values import LARGEST, SMALLEST, number, one_of
 from grasp_core.arrays import Array, cross, frozen
 from grasp_core.by_value import ByValue
 from grasp_core.closure.contacts import cross_matrix, grasp_map
 from grasp_core.declared import trusted
 from grasp_core.errors import InputError, SolverError
 from grasp_core.execution.grips import Grip, check_grip
-from grasp_core.kinds import LARGEST, SMALLEST, number, one_of
 from grasp_core.quality.motors import Motors, motors_for
 
 LEFT_WRENCH = 1e-11

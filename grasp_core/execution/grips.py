@@ -47,6 +47,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import ArrayLike
 
+from grasp_core.allowed_values import LARGEST, SMALLEST, instance
 from grasp_core.arrays import Array, Frictions, Shape, UnitVectors, frozen, frozen_each, real_array
 from grasp_core.closure.contacts import (
     LEAST_CONTACTS,
@@ -61,7 +62,6 @@ from grasp_core.closure.contacts import (
 )
 from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError
-from grasp_core.kinds import LARGEST, SMALLEST, instance
 from grasp_core.objects.on_faces import check_body, check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp

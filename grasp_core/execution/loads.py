@@ -51,12 +51,12 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import ArrayLike
 
+from grasp_core.allowed_values import LARGEST, SMALLEST, Quantity, number, value_of
 from grasp_core.arrays import Array, Shape, frozen
 from grasp_core.closure.contacts import WRENCH
 from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError
 from grasp_core.execution.grips import Grip
-from grasp_core.kinds import LARGEST, SMALLEST, Quantity, number, value_of
 from grasp_core.solvers.ties import first_best
 
 GRAVITY_M_PER_S2 = 9.80665

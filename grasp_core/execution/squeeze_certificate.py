@@ -46,12 +46,12 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from grasp_core.allowed_values import NotNegative
 from grasp_core.arrays import Amount, Array, Indices, ProofNumber, Shape, of_order_one
 from grasp_core.closure.contacts import WRENCH, grasp_map, in_frames
 from grasp_core.declared import Declared, declared, trusted
 from grasp_core.execution.grips import Grip
 from grasp_core.execution.loads import LoadSet, Reactions
-from grasp_core.kinds import NotNegative
 from grasp_core.quality.motors import Motors, motors_for
 
 PROOF_SLACK = 1e-9

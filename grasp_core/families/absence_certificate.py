@@ -14,11 +14,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from grasp_core.allowed_values import FrictionOrZero
 from grasp_core.arrays import Array
 from grasp_core.closure.closure_certificate import ClosureCertificate
 from grasp_core.declared import Declared, declared
 from grasp_core.geometry.polygons import clip
-from grasp_core.kinds import FrictionOrZero
 from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.solvers.ties import first_best
 

@@ -19,11 +19,11 @@ from typing import Any, ClassVar, NamedTuple, Self, TypeVar, cast, get_type_hint
 from pydantic import Field, ValidationError
 from pydantic_core import PydanticSerializationError, to_json
 
+from grasp_core.allowed_values import adapter, input_error
 from grasp_core.declared import Declared, default_of, flat_parts, types
 from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import TOO_DEEP, object_of, shown, text_of
 from grasp_core.files.text_files import read_text
-from grasp_core.kinds import adapter, input_error
 from grasp_core.messages import at, near
 
 UNRECORDED: Any = Field(exclude=True)

@@ -49,6 +49,7 @@ from annotated_types import Interval, Len
 from numpy.typing import ArrayLike
 from pydantic import AfterValidator, Field
 
+from grasp_core.allowed_values import TorqueLimit, value_of
 from grasp_core.arrays import Array, Indices, Shape, UnitVector, frozen_each
 from grasp_core.by_value import counted, summary
 from grasp_core.declared import Declared, declared
@@ -56,7 +57,6 @@ from grasp_core.errors import InputError
 from grasp_core.files.json_text import object_of
 from grasp_core.files.records import from_record
 from grasp_core.files.text_files import read_text
-from grasp_core.kinds import TorqueLimit, value_of
 from grasp_core.messages import UnfitError, shown
 from grasp_core.names import HANDS
 

@@ -17,12 +17,12 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from grasp_core.allowed_values import Direction, value_of
 from grasp_core.arrays import Array, Indices, cross, frozen_copy, real_array
 from grasp_core.compiled import compiled
 from grasp_core.errors import InputError
 from grasp_core.frames import POSE_SIZE
 from grasp_core.hands.hand import FILE_DIGITS, PALM_NAME, Hand, HandFinger, LinkShape
-from grasp_core.kinds import Direction, value_of
 
 _Part: TypeAlias = tuple[int, LinkShape]  # a shape with the number of its link
 LEAST_BALL = 0.008

@@ -52,6 +52,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import ArrayLike
 
+from grasp_core.allowed_values import LARGEST, Quantity, value_of
 from grasp_core.arrays import UNIT_SLACK, Array, Shape, cross
 from grasp_core.closure.contacts import WRENCH, contact_frictions, cross_matrix
 from grasp_core.declared import declared
@@ -62,7 +63,6 @@ from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_arrays import HandPlaces, direction, jacobian, places
 from grasp_core.hands.reach import HandReach, Stance, stance_of
-from grasp_core.kinds import LARGEST, Quantity, value_of
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors

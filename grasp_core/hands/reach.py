@@ -18,6 +18,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 import numpy as np
 from pydantic import Field, computed_field
 
+from grasp_core.allowed_values import Friction, HandClearance, Number, instance, value_of
 from grasp_core.arrays import Array, Indices, Shape, UnitVector, frozen_indices
 from grasp_core.by_value import summary
 from grasp_core.closure.closure_certificate import ClosureCertificate
@@ -29,7 +30,6 @@ from grasp_core.hands.hand import Fingertip, Hand
 from grasp_core.hands.hand_arrays import places
 from grasp_core.hands.pose_search import AskedPose, contact_choices, find_pose, opened
 from grasp_core.hands.settings import ReachSettings
-from grasp_core.kinds import Friction, HandClearance, Number, instance, value_of
 from grasp_core.messages import shown
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron

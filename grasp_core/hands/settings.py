@@ -1,7 +1,7 @@
 """Settings of the search for a pose of a hand; nothing here is slow to import, as help waits."""
 
+from grasp_core.allowed_values import Direction, HandClearance, Seed, Starts
 from grasp_core.declared import declared
-from grasp_core.kinds import Direction, HandClearance, Seed, Starts
 from grasp_core.settings import Settings
 
 

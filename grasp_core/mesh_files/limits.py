@@ -5,8 +5,8 @@ from typing import Annotated, Literal, TypeAlias
 
 from annotated_types import Interval
 
+from grasp_core.allowed_values import Count, Quantity
 from grasp_core.declared import declared
-from grasp_core.kinds import Count, Quantity
 from grasp_core.settings import Settings
 
 FaceKind: TypeAlias = Literal["auto", "planar", "patches"]

@@ -21,10 +21,10 @@ from functools import lru_cache
 
 import numpy as np
 
+from grasp_core.allowed_values import instance
 from grasp_core.arrays import Array, Indices, cross
 from grasp_core.errors import InputError
 from grasp_core.geometry.polygons import nearest_on_segments
-from grasp_core.kinds import instance
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.surface import Face, areas_and_normals
 from grasp_core.solvers.ties import first_best

@@ -16,11 +16,11 @@ import numpy as np
 from annotated_types import Interval
 from numpy.typing import ArrayLike
 
+from grasp_core.allowed_values import LARGEST, Quantity, instance, one_of, path_of, value_of
 from grasp_core.arrays import Array, Point, Polygon, Shape, Triangles, rounded
 from grasp_core.by_value import counted, summary
 from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError, MeshError, MeshRefusal, about
-from grasp_core.kinds import LARGEST, Quantity, instance, one_of, path_of, value_of
 from grasp_core.mesh_files.limits import FaceKind, MeshChoices, MeshLimits, PatchLimits
 from grasp_core.mesh_files.reading import FileSurface, read_triangles
 from grasp_core.messages import shown

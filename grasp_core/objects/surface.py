@@ -15,11 +15,11 @@ import numpy as np
 from annotated_types import Interval
 from numpy.typing import NDArray
 
+from grasp_core.allowed_values import LARGEST, NotNegative, Number
 from grasp_core.arrays import Array, Indices, Point, Polygon, Shape, UnitVector
 from grasp_core.by_value import counted, summary
 from grasp_core.declared import Declared, declared
 from grasp_core.errors import MeshError, MeshRefusal
-from grasp_core.kinds import LARGEST, NotNegative, Number
 from grasp_core.messages import MILLI
 from grasp_core.values import RIGHT_ANGLE
 

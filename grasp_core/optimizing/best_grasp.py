@@ -35,12 +35,7 @@ import numpy as np
 from annotated_types import Interval
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Amount, Array, Indices, frozen_each
-from grasp_core.closure.wrench_sets import WrenchSet
-from grasp_core.declared import Declared, declared
-from grasp_core.errors import InputError
-from grasp_core.geometry.polygons import convex_polygon
-from grasp_core.kinds import (
+from grasp_core.allowed_values import (
     LARGEST,
     Cases,
     Count,
@@ -53,6 +48,11 @@ from grasp_core.kinds import (
     several,
     value_of,
 )
+from grasp_core.arrays import Amount, Array, Indices, frozen_each
+from grasp_core.closure.wrench_sets import WrenchSet
+from grasp_core.declared import Declared, declared
+from grasp_core.errors import InputError
+from grasp_core.geometry.polygons import convex_polygon
 from grasp_core.names import MeasureName
 from grasp_core.objects.face_pieces import inset_piece, pieces_by_face
 from grasp_core.objects.on_faces import check_planar

@@ -19,12 +19,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from grasp_core.allowed_values import SMALLEST, Friction, Seed, number, value_of
 from grasp_core.arrays import Array
 from grasp_core.by_value import ByValue
 from grasp_core.errors import InputError
 from grasp_core.families.free import closed_at, of_general_type
 from grasp_core.families.placing import point_regions
-from grasp_core.kinds import SMALLEST, Friction, Seed, number, value_of
 from grasp_core.objects.face_pieces import FacePiece, deepest, inset_piece, pieces_by_face
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron

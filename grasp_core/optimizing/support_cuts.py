@@ -77,12 +77,12 @@ import numpy as np
 from annotated_types import Len
 from numpy.typing import NDArray
 
+from grasp_core.allowed_values import FrictionOrZero
 from grasp_core.arrays import Array, Indices, Shape
 from grasp_core.compiled import compiled
 from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError, about
 from grasp_core.files.text_files import read_bytes, write_parts
-from grasp_core.kinds import FrictionOrZero
 from grasp_core.optimizing.contact_places import REPLAY, Grounds, first_nodes, fitting
 from grasp_core.quality.measures import FERRARI_CANNY, Measure
 from grasp_core.values import FINGERS

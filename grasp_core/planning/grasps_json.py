@@ -17,16 +17,7 @@ import numpy as np
 from annotated_types import Interval, Len
 from pydantic import Field
 
-from grasp_core.arrays import Array, Indices, Point, Shape
-from grasp_core.closure.contacts import contact_frictions
-from grasp_core.declared import Declared, declared
-from grasp_core.errors import InputError, about
-from grasp_core.figures import Shown
-from grasp_core.files.file_kinds import CONTACTS_FILE, GRASPS
-from grasp_core.files.json_text import json_of, object_of, shown, text_of
-from grasp_core.files.records import RecordFile, from_record
-from grasp_core.files.text_files import read_text, write_text
-from grasp_core.kinds import (
+from grasp_core.allowed_values import (
     FLAT,
     LARGEST,
     LARGEST_FRICTION,
@@ -36,6 +27,15 @@ from grasp_core.kinds import (
     instance,
     path_of,
 )
+from grasp_core.arrays import Array, Indices, Point, Shape
+from grasp_core.closure.contacts import contact_frictions
+from grasp_core.declared import Declared, declared
+from grasp_core.errors import InputError, about
+from grasp_core.figures import Shown
+from grasp_core.files.file_kinds import CONTACTS_FILE, GRASPS
+from grasp_core.files.json_text import json_of, object_of, shown, text_of
+from grasp_core.files.records import RecordFile, from_record
+from grasp_core.files.text_files import read_text, write_text
 from grasp_core.mesh_files.limits import MeshLimits, PatchLimits
 from grasp_core.objects.build import MeshChoices
 from grasp_core.objects.on_faces import check_on_faces

@@ -16,11 +16,11 @@ from contextlib import nullcontext
 from functools import partial
 from typing import Any
 
+from grasp_core.allowed_values import Count, function, instance, value_of
 from grasp_core.cones.spanning import count_spanning
 from grasp_core.errors import InputError
 from grasp_core.families.placements import LEAST_RADIUS
 from grasp_core.frames import kept_angle
-from grasp_core.kinds import Count, function, instance, value_of
 from grasp_core.names import Method, RankBy
 from grasp_core.objects.planar_faces import MAX_FACES
 from grasp_core.objects.polyhedron import Polyhedron

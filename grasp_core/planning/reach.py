@@ -20,10 +20,10 @@ from itertools import combinations, islice, product
 
 import numpy as np
 
+from grasp_core.allowed_values import Quantity
 from grasp_core.arrays import Array
 from grasp_core.declared import declared
 from grasp_core.geometry.polygons import plane_frame
-from grasp_core.kinds import Quantity
 from grasp_core.objects.on_faces import nearest_on_triangles, on_face_slack
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.settings import Settings

@@ -9,6 +9,16 @@ from typing import Annotated, Any, Literal, Protocol, TypeAlias, get_args, runti
 
 from pydantic import Field
 
+from grasp_core.allowed_values import (
+    SMALLEST,
+    FaceSets,
+    Friction,
+    Number,
+    Seed,
+    function,
+    number,
+    value_of,
+)
 from grasp_core.arrays import UNIT_SLACK
 from grasp_core.by_value import counted, summary
 from grasp_core.declared import Declared, declared
@@ -16,7 +26,6 @@ from grasp_core.errors import InputError
 from grasp_core.figures import Shown, figure
 from grasp_core.files.records import UNRECORDED
 from grasp_core.grasp_tables import ById, frame_of
-from grasp_core.kinds import SMALLEST, FaceSets, Friction, Number, Seed, function, number, value_of
 from grasp_core.names import METHODS, Family, Method
 from grasp_core.notebooks import InNotebooks
 from grasp_core.objects.on_faces import check_body

@@ -4,8 +4,8 @@ from typing import Annotated
 
 from annotated_types import Len
 
+from grasp_core.allowed_values import Count, Friction, NotNegative, Quantity, Seed, TimeLimit
 from grasp_core.declared import declared
-from grasp_core.kinds import Count, Friction, NotNegative, Quantity, Seed, TimeLimit
 from grasp_core.names import METHODS, ConeKind, Method, RankBy
 from grasp_core.settings import Settings
 

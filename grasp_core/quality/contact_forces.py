@@ -33,6 +33,7 @@ from typing import Literal, TypeAlias, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
+from grasp_core.allowed_values import LARGEST, SMALLEST, number, one_of, several
 from grasp_core.arrays import SMALLEST_SIZE, Array, frozen
 from grasp_core.closure.contacts import (
     contact_arrays,
@@ -47,7 +48,6 @@ from grasp_core.closure.proofs import ContactCones
 from grasp_core.closure.wrench_sets import contact_program
 from grasp_core.cones.pyramids import PYRAMID_SIDES, facet_turns, inscribed_share
 from grasp_core.errors import InputError, NoForcesError, SolverError
-from grasp_core.kinds import LARGEST, SMALLEST, number, one_of, several
 from grasp_core.messages import shown
 from grasp_core.solvers import conic, qp
 from grasp_core.solvers.conic import ConicProgram

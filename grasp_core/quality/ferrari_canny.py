@@ -69,12 +69,12 @@ import numpy as np
 from annotated_types import Interval
 from numpy.typing import ArrayLike, NDArray
 
+from grasp_core.allowed_values import value_of
 from grasp_core.arrays import Array, Indices, ProofNumber, Shape
 from grasp_core.closure.contacts import WRENCH
 from grasp_core.closure.wrench_sets import Norm, WrenchSet, nearest_wrench
 from grasp_core.compiled import compiled
 from grasp_core.declared import Declared, declared, trusted
-from grasp_core.kinds import value_of
 from grasp_core.values import Contact, Grasp
 
 QUALITY_GAP = 1e-4

@@ -55,12 +55,12 @@ from typing import Annotated, NamedTuple, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from grasp_core.allowed_values import LARGEST, SMALLEST, one_of
 from grasp_core.arrays import Array, ProofNumber, Shape, frozen
 from grasp_core.closure.contacts import WRENCH
 from grasp_core.closure.wrench_sets import WrenchSet, contact_program, into_cones
 from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError, SolverError
-from grasp_core.kinds import LARGEST, SMALLEST, one_of
 from grasp_core.names import MeasureName
 from grasp_core.quality.ferrari_canny import (
     CHECK_SLACK,

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from grasp_core.allowed_values import Edges, value_of
 from grasp_core.arrays import Array, frozen
 from grasp_core.closure.contacts import (
     WRENCH,
@@ -25,7 +26,6 @@ from grasp_core.closure.contacts import (
 )
 from grasp_core.closure.wrench_sets import WrenchSet, scaled_arms
 from grasp_core.errors import InputError
-from grasp_core.kinds import Edges, value_of
 from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
 from grasp_core.values import Contact, Grasp
 

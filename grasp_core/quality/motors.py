@@ -22,10 +22,10 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import ArrayLike
 
+from grasp_core.allowed_values import LARGEST, SMALLEST, instance
 from grasp_core.arrays import Array, Shape, frozen, frozen_each
 from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError
-from grasp_core.kinds import LARGEST, SMALLEST, instance
 
 
 @declared

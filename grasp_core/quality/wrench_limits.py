@@ -46,6 +46,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from grasp_core.allowed_values import LARGEST, SMALLEST, Quantity, value_of
 from grasp_core.arrays import Amount, Array, Points, ProofNumber, Shape, Wrench, cross, frozen
 from grasp_core.closure.contacts import (
     LOCAL,
@@ -64,7 +65,6 @@ from grasp_core.closure.proofs import ContactCones
 from grasp_core.closure.wrench_sets import WrenchSet, contact_program
 from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError, SolverError
-from grasp_core.kinds import LARGEST, SMALLEST, Quantity, value_of
 from grasp_core.quality.allowed_forces import SUM_ROUNDING, AllowedForces, AskedLoad, Mixture
 from grasp_core.quality.ferrari_canny import wrench_set_quality
 from grasp_core.quality.motors import Motors, motors_for

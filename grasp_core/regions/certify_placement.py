@@ -23,9 +23,9 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import ArrayLike
 
+from grasp_core.allowed_values import LARGEST, Friction, MaxCones, number, value_of
 from grasp_core.arrays import Array, Shape, frozen, frozen_each
 from grasp_core.geometry.polygons import clip, tidy
-from grasp_core.kinds import LARGEST, Friction, MaxCones, number, value_of
 from grasp_core.objects.face_pieces import LEAST_INRADIUS, FacePiece
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.planar_faces import planar_slack

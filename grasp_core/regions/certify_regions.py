@@ -13,6 +13,7 @@ import math
 
 import numpy as np
 
+from grasp_core.allowed_values import Friction, MaxCones, Reserve, number, value_of
 from grasp_core.arrays import Array
 from grasp_core.closure.closure_certificate import ClosureCertificate
 from grasp_core.closure.contacts import stacked
@@ -28,7 +29,6 @@ from grasp_core.geometry.polygons import (
     tidy,
     with_fewer_corners,
 )
-from grasp_core.kinds import Friction, MaxCones, Reserve, number, value_of
 from grasp_core.objects.face_pieces import FacePiece, deepest, inscribed_radius, piece_of
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron

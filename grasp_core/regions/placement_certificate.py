@@ -57,6 +57,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from grasp_core.allowed_values import Friction, NotNegative, Share
 from grasp_core.arrays import Amount, Array, Point, Polygon, Shape, cross
 from grasp_core.closure.contacts import unit_size
 from grasp_core.closure.decision import decided_at_once
@@ -64,7 +65,6 @@ from grasp_core.closure.proofs import ContactCones
 from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError
 from grasp_core.geometry.polygons import circle, convex_polygon, plane_frame
-from grasp_core.kinds import Friction, NotNegative, Share
 from grasp_core.regions.regions_certificate import PLACE_SLACK, TwistCover
 from grasp_core.values import FINGERS
 

@@ -51,6 +51,7 @@ from typing import Annotated
 import numpy as np
 from annotated_types import Interval
 
+from grasp_core.allowed_values import LARGEST_FRICTION, Quantity
 from grasp_core.arrays import Amount, Array, Indices, Point, Polygon, Shape, Wrench, is_array
 from grasp_core.closure.closure_certificate import ClosureCertificate
 from grasp_core.declared import Declared, declared
@@ -64,7 +65,6 @@ from grasp_core.geometry.polygons import (
     holds_disc,
     plane_frame,
 )
-from grasp_core.kinds import LARGEST_FRICTION, Quantity
 from grasp_core.values import FINGERS, ContactRegion
 
 TWIST = 6

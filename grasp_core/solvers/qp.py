@@ -26,10 +26,10 @@ from typing import Any
 
 import numpy as np
 
+from grasp_core.allowed_values import one_of
 from grasp_core.arrays import Array
 from grasp_core.compiled import compiled
 from grasp_core.errors import SolverError
-from grasp_core.kinds import one_of
 
 PROXQP = "proxqp"
 OPTIONS: dict[str, dict[str, Any]] = {

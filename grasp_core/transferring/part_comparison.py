@@ -43,10 +43,10 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
+from grasp_core.allowed_values import FaceTurn, Vector, number, value_of
 from grasp_core.arrays import Array, cross
 from grasp_core.by_value import counted
 from grasp_core.declared import Declared, declared
-from grasp_core.kinds import FaceTurn, Vector, number, value_of
 from grasp_core.messages import MILLI
 from grasp_core.objects.on_faces import nearest_on_triangles, on_face_slack
 from grasp_core.objects.polyhedron import Polyhedron

@@ -3,8 +3,8 @@
 from dataclasses import replace
 from typing import Literal
 
+from grasp_core.allowed_values import FaceTurn, NotNegative, Quantity
 from grasp_core.declared import declared
-from grasp_core.kinds import FaceTurn, NotNegative, Quantity
 from grasp_core.mesh_files.limits import LengthUnit
 from grasp_core.settings import Settings
 

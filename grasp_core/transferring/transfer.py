@@ -36,6 +36,7 @@ from typing import Annotated, Any, Literal, TypeAlias, get_args
 import numpy as np
 from pydantic import Field, computed_field
 
+from grasp_core.allowed_values import Friction, Null, OrInfinity, instance, several, value_of
 from grasp_core.arrays import Array
 from grasp_core.by_value import counted, summary
 from grasp_core.closure.closure_certificate import ClosureCertificate
@@ -45,7 +46,6 @@ from grasp_core.errors import InputError, UndecidedError
 from grasp_core.families.free import of_general_type
 from grasp_core.families.placements import Placement
 from grasp_core.files.records import UNRECORDED
-from grasp_core.kinds import Friction, Null, OrInfinity, instance, several, value_of
 from grasp_core.mesh_files.limits import MeshLimits
 from grasp_core.mesh_files.reading import read_triangles
 from grasp_core.messages import MILLI

@@ -22,6 +22,7 @@ from typing import Annotated, Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from grasp_core.allowed_values import instance
 from grasp_core.arrays import Array, Indices
 from grasp_core.arrays import Shape as ArrayShape
 from grasp_core.declared import Declared, declared
@@ -31,7 +32,6 @@ from grasp_core.geometry.polygons import FEWEST_CORNERS
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_arrays import hand_arrays, places
 from grasp_core.hands.reach import HandReach, with_balls
-from grasp_core.kinds import instance
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.ties import first_best
 from grasp_core.values import Contact, Grasp

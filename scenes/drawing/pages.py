@@ -22,12 +22,12 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from grasp_core.allowed_values import path_of
 from grasp_core.arrays import Array
 from grasp_core.by_value import ByValue, counted
 from grasp_core.files.text_files import write_parts
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach
-from grasp_core.kinds import path_of
 from grasp_core.messages import MILLI
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.result import Plan

@@ -19,11 +19,11 @@ from typing import Annotated, Literal, Self, TypeAlias
 
 import numpy as np
 
+from grasp_core.allowed_values import Quantity, number
 from grasp_core.arrays import Array, Indices, Point, Polygon
 from grasp_core.arrays import Shape as ArrayShape
 from grasp_core.declared import Declared, declared
 from grasp_core.geometry.polygons import FEWEST_CORNERS, convex_hull
-from grasp_core.kinds import Quantity, number
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.ties import first_best
 from grasp_core.values import Grasp

@@ -20,12 +20,12 @@ from pathlib import Path
 
 import numpy as np
 
+from grasp_core.allowed_values import Friction, instance, path_of, value_of
 from grasp_core.arrays import Array, Indices, cross
 from grasp_core.cones.spanning import angles_between
 from grasp_core.geometry.polygons import FEWEST_CORNERS
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach
-from grasp_core.kinds import Friction, instance, path_of, value_of
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.surface import Face

@@ -29,11 +29,11 @@ from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
+from grasp_core.allowed_values import path_of
 from grasp_core.arrays import Array, Indices
 from grasp_core.by_value import ByValue
 from grasp_core.errors import InputError
 from grasp_core.files.text_files import write_parts
-from grasp_core.kinds import path_of
 
 FINGER_COLOURS = ("#E69F00", "#56B4E9", "#009E73", "#CC79A7")
 """Colour of each finger, which its cones, region, line of force and curves share."""

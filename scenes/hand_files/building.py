@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from grasp_core.allowed_values import path_of, several, value_of
 from grasp_core.arrays import Array
 from grasp_core.errors import InputError, about
 from grasp_core.hands.collisions import overlapping_pairs
@@ -28,7 +29,6 @@ from grasp_core.hands.hand import (
     LinkShape,
 )
 from grasp_core.hands.hand_arrays import rotation_about
-from grasp_core.kinds import path_of, several, value_of
 from grasp_core.messages import shown
 from grasp_core.names import HANDS
 from scenes.hand_files.fingers import FingerChains, finger_chains, followers, joint_name, tip_of

@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Any, Self, get_args
 
 import numpy as np
 
+from grasp_core.allowed_values import Friction, instance, number, one_of, path_of, value_of
 from grasp_core.arrays import Array, rounded, to_digits
 from grasp_core.closure.contacts import contact_frames, listed_contacts, unit_size
 from grasp_core.closure.decision import deepest_forces
@@ -30,7 +31,6 @@ from grasp_core.closure.force_closure import force_closure
 from grasp_core.declared import Declared, declared
 from grasp_core.errors import UndecidedError
 from grasp_core.files.text_files import write_parts
-from grasp_core.kinds import Friction, instance, number, one_of, path_of, value_of
 from grasp_core.notebooks import InNotebooks
 from grasp_core.objects.on_faces import check_body, face_under
 from grasp_core.objects.polyhedron import Polyhedron

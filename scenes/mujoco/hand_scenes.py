@@ -35,6 +35,7 @@ from typing import cast
 
 import numpy as np
 
+from grasp_core.allowed_values import instance
 from grasp_core.arrays import Array, rounded, to_digits
 from grasp_core.errors import InputError
 from grasp_core.execution.grips import Grip
@@ -43,7 +44,6 @@ from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_arrays import direction
 from grasp_core.hands.hand_motors import HandGrip, hand_motors
 from grasp_core.hands.reach import HandReach, stance_of, uncoupled
-from grasp_core.kinds import instance
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors

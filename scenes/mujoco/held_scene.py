@@ -22,12 +22,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from grasp_core.allowed_values import Quantity, instance, value_of
 from grasp_core.arrays import Array, to_digits
 from grasp_core.closure.contacts import WRENCH, contact_frames, grasp_map
 from grasp_core.errors import InputError
 from grasp_core.execution.grips import Grip, check_grip
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
-from grasp_core.kinds import Quantity, instance, value_of
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from scenes.mujoco.fingertips import Slides

@@ -12,6 +12,7 @@ from typing import Annotated, Any, Self, get_args, get_origin
 
 from pydantic import Field
 
+from grasp_core.allowed_values import FLAT, Count, FrictionOrZero, NotNegative, Number
 from grasp_core.arrays import Array, Indices, Shape
 from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError, about
@@ -20,15 +21,14 @@ from grasp_core.files.file_kinds import BASELINE
 from grasp_core.files.json_text import shown
 from grasp_core.files.records import RecordFile, record_of
 from grasp_core.files.text_files import read_text, write_text
-from grasp_core.kinds import FLAT, Count, FrictionOrZero, NotNegative, Number
 from grasp_core.objects.build import MeshChoices
 from grasp_core.objects.polyhedron import Polyhedron, polyhedron_from_mesh
 from grasp_core.objects.surface import Surface
 from grasp_core.planning.grasps_json import RECORDED
 from grasp_core.settings import Settings, extended
 from sim_validate.closure.verdict import Verdict
+from sim_validate.engine.held_or_let_go import Outcome
 from sim_validate.engine.setup import Agenda, Setup
-from sim_validate.engine.traces import Outcome
 from sim_validate.execution.verdict import ExecutedGrasp, Execution
 from sim_validate.files.kept_figures import Kept, keeps
 from sim_validate.files.result_files import AboutObject

@@ -20,7 +20,7 @@ from grasp_core.figures import Compared, Shown, Worse, compared, figure, unit_of
 from grasp_core.files.records import UNRECORDED, record_of
 from grasp_core.transferring.transfer import FRICTION_BAND
 from sim_validate.baselines.baseline import BASELINE_DIGITS, Baseline, KeptGrasp
-from sim_validate.engine.traces import LET_GO, Outcome
+from sim_validate.engine.held_or_let_go import LET_GO, Outcome
 
 DIGITS_OF_CHANGE = 2
 LEAST_DIGITS = 4

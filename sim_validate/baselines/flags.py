@@ -6,8 +6,8 @@ from typing import Annotated
 
 from tyro.conf import Positional, arg
 
+from grasp_core.allowed_values import Seed
 from grasp_core.declared import declared
-from grasp_core.kinds import Seed
 from grasp_core.transferring.settings import IfChanged
 from sim_validate.commands.flags import BARE, FirstOnly, GraspsPath, Jobs, Spoken
 from sim_validate.processes.workers import available_cores

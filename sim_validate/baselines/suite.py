@@ -12,9 +12,16 @@ from typing import Annotated, Any
 
 from annotated_types import Interval
 
+from grasp_core.allowed_values import (
+    LARGEST_FRICTION,
+    RandomWrenches,
+    Repeats,
+    Seed,
+    Share,
+    value_of,
+)
 from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError, about
-from grasp_core.kinds import LARGEST_FRICTION, RandomWrenches, Repeats, Seed, Share, value_of
 from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron
 from grasp_core.planning.grasps_json import load_grasps
 from grasp_core.planning.planner import plan

@@ -29,6 +29,7 @@ from sim_validate.commands.console import TABLE_ROWS, Reporter, warn_of
 from sim_validate.commands.exit_codes import Exit, FlagsError
 from sim_validate.commands.simulation_flags import Testing
 from sim_validate.engine.gate import ClosureCase
+from sim_validate.engine.held_or_let_go import Outcome
 from sim_validate.engine.known_cases import measured
 from sim_validate.engine.setup import (
     Agenda,
@@ -38,7 +39,6 @@ from sim_validate.engine.setup import (
     with_planned_radius,
     wrenches_from_file,
 )
-from sim_validate.engine.traces import Outcome
 from sim_validate.files.array_files import write_arrays
 from sim_validate.files.results_folder import remove_results
 from sim_validate.processes.compiling import EVERYTHING, compile_loops

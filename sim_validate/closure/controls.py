@@ -19,6 +19,7 @@ import numpy as np
 from annotated_types import Len
 from pydantic import Field, computed_field
 
+from grasp_core.allowed_values import FLAT, Friction
 from grasp_core.arrays import Array, Wrench, cross, rounded, to_digits
 from grasp_core.closure.closure_certificate import ClosureCertificate
 from grasp_core.closure.contacts import stacked
@@ -26,16 +27,15 @@ from grasp_core.declared import Declared, declared
 from grasp_core.errors import SolverError, UndecidedError
 from grasp_core.figures import Shown
 from grasp_core.files.records import UNRECORDED
-from grasp_core.kinds import FLAT, Friction
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.contact_forces import least_friction_forces
 from grasp_core.values import Contact, Grasp
 from scenes.mujoco.fingertip_room import clashes, fitting_radius
+from sim_validate.engine.held_or_let_go import LET_GO, HoldVerdict, Outcome, Trace, judge
 from sim_validate.engine.rig import Rig, squeezed
 from sim_validate.engine.schedules import TrialLoad
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.engine.stepping import Bench
-from sim_validate.engine.traces import LET_GO, HoldVerdict, Outcome, Trace, judge
 
 FRICTION_SHARE = 0.9
 """Friction of the low-friction control, relative to the lowest at which the grasp is in closure."""

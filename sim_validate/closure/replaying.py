@@ -12,13 +12,13 @@ from typing import Annotated, TypeAlias
 
 from pydantic import Field, computed_field
 
+from grasp_core.allowed_values import FLAT, OrInfinity
 from grasp_core.arrays import Wrench
 from grasp_core.closure.contacts import contacts_sha256, stacked
 from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError
 from grasp_core.files.file_kinds import GRASPS, VERDICTS
 from grasp_core.files.records import UNRECORDED
-from grasp_core.kinds import FLAT, OrInfinity
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.grasps_json import load_grasps
 from grasp_core.planning.result import Plan
@@ -28,12 +28,12 @@ from scenes.mujoco.fingertip_room import clashes
 from sim_validate.closure.controls import Control, ControlLoad, ControlTrial, control_case
 from sim_validate.closure.validate import OPENED_BY_NOISE, for_repeats, noisy_case, off_faces
 from sim_validate.closure.verdict import Verdict, WrenchVerdict, load_verdicts
+from sim_validate.engine.held_or_let_go import HoldVerdict, Outcome, judge
 from sim_validate.engine.misplacement import disturbed
 from sim_validate.engine.planned_loads import LoadPlanner, PlannedLoad
 from sim_validate.engine.rig import Rig, Watched, closed_on
 from sim_validate.engine.schedules import TrialLoad
 from sim_validate.engine.setup import WEAKEST, Agenda, Setup
-from sim_validate.engine.traces import HoldVerdict, Outcome, judge
 from sim_validate.planning.asked_objects import grasp_with_id, some
 
 

@@ -26,10 +26,10 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from grasp_core.allowed_values import Count, Friction, function, instance, several, value_of
 from grasp_core.arrays import Array
 from grasp_core.closure.contacts import stacked
 from grasp_core.errors import InputError, UndecidedError, UnfaithfulError
-from grasp_core.kinds import Count, Friction, function, instance, several, value_of
 from grasp_core.objects.on_faces import check_body, check_on_faces, edge_distance
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Grasp
@@ -45,6 +45,7 @@ from sim_validate.closure.verdict import (
     WrenchVerdict,
 )
 from sim_validate.engine.gate import ClosureCase
+from sim_validate.engine.held_or_let_go import LET_GO, HoldVerdict, Outcome, judge
 from sim_validate.engine.known_cases import Gate, checked, untouching
 from sim_validate.engine.misplacement import Disturbed, disturbed
 from sim_validate.engine.planned_loads import LoadPlanner, PlannedLoad
@@ -53,7 +54,6 @@ from sim_validate.engine.setup import WEAKEST, Agenda, Setup
 from sim_validate.engine.simulated_friction import CriticalFriction, released_friction
 from sim_validate.engine.simulated_limits import SimulatedLimit, bisected_limits, ramped_limits
 from sim_validate.engine.stepping import Bench
-from sim_validate.engine.traces import LET_GO, HoldVerdict, Outcome, judge
 from sim_validate.processes.own_faults import OWN_FAULTS
 from sim_validate.processes.workers import each, processes
 

@@ -15,24 +15,24 @@ import numpy as np
 from annotated_types import Len
 from pydantic import computed_field
 
+from grasp_core.allowed_values import FLAT, Friction, Measured, OrInfinity, path_of
 from grasp_core.arrays import Array, Shape, Wrench
 from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.declared import Declared, declared
 from grasp_core.figures import Compared, Shown, figure, less, more
 from grasp_core.files.file_kinds import VERDICTS
 from grasp_core.files.records import UNRECORDED
-from grasp_core.kinds import FLAT, Friction, Measured, OrInfinity, path_of
 from grasp_core.messages import MICRO
 from grasp_core.notebooks import InNotebooks
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact
 from scenes.mujoco.closure_scene import FingerDrive, Layout, Scene
 from sim_validate.closure.controls import ControlVerdict
+from sim_validate.engine.held_or_let_go import LET_GO, HoldVerdict, Outcome, Trace
 from sim_validate.engine.known_cases import Gate
 from sim_validate.engine.setup import WEAKEST, Agenda, Setup
 from sim_validate.engine.simulated_friction import CriticalFriction
 from sim_validate.engine.simulated_limits import SimulatedLimit
-from sim_validate.engine.traces import LET_GO, HoldVerdict, Outcome, Trace
 from sim_validate.files.result_files import AboutGrasps, AboutObject
 from sim_validate.settings import Noise
 

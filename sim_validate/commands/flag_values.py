@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, get_args, get_origin
 from tyro.conf import OmitArgPrefixes, UseAppendAction
 from tyro.constructors import ConstructorRegistry, PrimitiveConstructorSpec
 
-from grasp_core.kinds import Vector
+from grasp_core.allowed_values import Vector
 from grasp_core.settings import types
 from sim_validate.commands.flags import BARE
 

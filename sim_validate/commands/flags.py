@@ -12,8 +12,7 @@ from annotated_types import Interval
 from pydantic import AfterValidator
 from tyro.conf import Positional, UseAppendAction, arg
 
-from grasp_core.declared import declared
-from grasp_core.kinds import (
+from grasp_core.allowed_values import (
     MOST_COUNT,
     Cases,
     Count,
@@ -28,6 +27,7 @@ from grasp_core.kinds import (
     ending,
     nonzero,
 )
+from grasp_core.declared import declared
 from grasp_core.mesh_files.limits import MESH_FORMATS, FileLengths, MeshChoices, MeshLimits
 from grasp_core.names import RANKINGS, MeasureName, RankBy
 from grasp_core.planning.settings import PlanSettings

@@ -12,8 +12,8 @@ from typing import Annotated
 
 from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 
+from grasp_core.allowed_values import Direction, Quantity, Seed, TimeLimit
 from grasp_core.declared import declared
-from grasp_core.kinds import Direction, Quantity, Seed, TimeLimit
 from grasp_core.settings import Settings
 from scenes.settings import EXPORT_ENDINGS, GraspFormat, ScaledScene
 from sim_validate.commands.flags import (

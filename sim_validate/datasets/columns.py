@@ -13,10 +13,10 @@ from typing import Annotated, Any, Literal, TypeAlias
 import numpy as np
 from annotated_types import Interval
 
+from grasp_core.allowed_values import FLAT, Friction, Number, Seed, Share
 from grasp_core.arrays import Array, Indices, Shape, Wrench
 from grasp_core.declared import Declared, declared, rules, types
 from grasp_core.errors import InputError
-from grasp_core.kinds import FLAT, Friction, Number, Seed, Share
 from grasp_core.names import Family
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.given_contacts import seat
@@ -33,7 +33,7 @@ from sim_validate.datasets.parquet import (
     columns_of,
     in_columns,
 )
-from sim_validate.engine.traces import HoldVerdict, Outcome
+from sim_validate.engine.held_or_let_go import HoldVerdict, Outcome
 from sim_validate.execution.verdict import Execution, ExecutionTrial
 from sim_validate.files.kept_figures import Kept, keeps
 

@@ -15,9 +15,9 @@ from typing import Annotated, Literal, TypeAlias, cast, get_args
 
 from annotated_types import Interval
 
+from grasp_core.allowed_values import MOST_COUNT, Count, Friction, RandomWrenches
 from grasp_core.declared import declared
 from grasp_core.errors import InputError, about
-from grasp_core.kinds import MOST_COUNT, Count, Friction, RandomWrenches
 from grasp_core.mesh_files.limits import FaceKind, FileLengths
 from grasp_core.messages import shown
 from grasp_core.names import METHODS, ConeKind, Method

@@ -6,8 +6,8 @@ from typing import Annotated, Literal
 
 from tyro.conf import Positional
 
+from grasp_core.allowed_values import Count, Seed, Share
 from grasp_core.declared import declared
-from grasp_core.kinds import Count, Seed, Share
 from grasp_core.settings import Settings
 from sim_validate.commands.flags import BARE, Positive, Spoken
 from sim_validate.datasets.config import Content, Learning, PlannedContent

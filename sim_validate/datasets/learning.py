@@ -19,6 +19,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from grasp_core.allowed_values import LARGEST_FRICTION
 from grasp_core.arrays import Array
 from grasp_core.closure.closure_certificate import ClosureCertificate
 from grasp_core.closure.contacts import contacts_sha256, stacked
@@ -30,7 +31,6 @@ from grasp_core.execution.loads import any_direction
 from grasp_core.geometry.polygons import convex_hull, edge_rows, plane_frame
 from grasp_core.hands.hand import load_hand
 from grasp_core.hands.reach import reach_with
-from grasp_core.kinds import LARGEST_FRICTION
 from grasp_core.objects.on_faces import within
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.given_contacts import Seated, grasp_of, seat

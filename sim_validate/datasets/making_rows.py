@@ -33,8 +33,8 @@ from sim_validate.datasets.given_grasps import GraspToJudge
 from sim_validate.datasets.open_dataset import mesh_path, mesh_text
 from sim_validate.datasets.parquet import RowCells
 from sim_validate.datasets.work_units import WorkUnit
+from sim_validate.engine.held_or_let_go import Outcome
 from sim_validate.engine.setup import Agenda, Setup
-from sim_validate.engine.traces import Outcome
 from sim_validate.processes.own_faults import OWN_FAULTS
 
 PLANNED_KIND = "planned"

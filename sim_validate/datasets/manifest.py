@@ -15,13 +15,13 @@ from typing import Annotated
 from annotated_types import Interval
 from pydantic import computed_field
 
+from grasp_core.allowed_values import Number
 from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError, about
 from grasp_core.files.file_kinds import MANIFEST, QUARANTINE
 from grasp_core.files.json_text import object_of, shown
 from grasp_core.files.records import RecordFile, from_record, record_of
 from grasp_core.files.text_files import read_text, write_text
-from grasp_core.kinds import Number
 from grasp_core.messages import FieldError
 from sim_validate.datasets.columns import dataset_tables, groups_asked
 from sim_validate.datasets.config import Name, SplitName

@@ -18,10 +18,10 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
+from grasp_core.allowed_values import one_of, path_of
 from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import object_of
 from grasp_core.files.records import Record, from_record, record_of
-from grasp_core.kinds import one_of, path_of
 from grasp_core.mesh_files.limits import MeshChoices
 from grasp_core.mesh_files.reading import FileSurface, read_triangles
 from grasp_core.objects.build import DEFAULT_LIMITS, content_hash

@@ -26,13 +26,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from grasp_core.allowed_values import OrInfinity
 from grasp_core.arrays import Shape
 from grasp_core.declared import rules, types
 from grasp_core.errors import InputError
 from grasp_core.figures import Figure, figures, meanings, unit_of
 from grasp_core.files.json_text import shown
 from grasp_core.files.records import entries, record_of
-from grasp_core.kinds import OrInfinity
 from grasp_core.values import FINGERS
 from sim_validate.datasets.config import KEYS, Name
 

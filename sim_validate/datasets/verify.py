@@ -63,7 +63,7 @@ from sim_validate.datasets.open_dataset import CONFIG, Dataset, select
 from sim_validate.datasets.parquet import RowCells, agrees, pyarrow
 from sim_validate.datasets.work_units import WorkUnit, provenance
 from sim_validate.datasets.writing import GIVEN_CONTACTS, TWIN
-from sim_validate.engine.traces import Outcome
+from sim_validate.engine.held_or_let_go import Outcome
 from sim_validate.execution.execute import tip_radius
 from sim_validate.execution.verdict import ExecutionTrial, may_slip
 from sim_validate.files.locks import LOCK

@@ -22,7 +22,7 @@ With mu the friction and N the normal force of a contact:
 
 The loads and frictions at which the boxes slip are found and judged as those of grasps are, by
 holds, ramps and releases, but every trial has its full length: that trials of grasps may end early
-presumes that nothing slips later (`traces`). So thresholds too loose to notice a slip are
+presumes that nothing slips later (`held_or_let_go`). So thresholds too loose to notice a slip are
 refused, like settings that slip falsely. The cases have the friction and the size of the object
 under test.
 
@@ -47,6 +47,7 @@ from grasp_core.closure.contacts import contact_frictions, stacked
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.wrench_limits import WrenchBody, axis_wrenches, limit_of
 from grasp_core.values import Contact
+from sim_validate.engine.held_or_let_go import holds
 from sim_validate.engine.known_cases import (
     DEPTH,
     DEPTH_ERROR,
@@ -64,7 +65,6 @@ from sim_validate.engine.setup import Setup
 from sim_validate.engine.simulated_friction import bisected, forces_just_above, released_friction
 from sim_validate.engine.simulated_limits import SimulatedLimit, bisected_limits, ramped_limits
 from sim_validate.engine.stepping import CLOCK_SLACK_S, Bench
-from sim_validate.engine.traces import holds
 
 LEAST_OFFSET, MOST_OFFSET_FRICTION = 0.01, 1.0
 """Least and largest critical friction that two offset fingers on the box can be made to need."""

@@ -14,10 +14,10 @@ from typing import Protocol
 import numpy as np
 from pydantic import computed_field
 
+from grasp_core.allowed_values import Measured, OrInfinity
 from grasp_core.arrays import Array
 from grasp_core.declared import Declared, declared
 from grasp_core.errors import UnfaithfulError
-from grasp_core.kinds import Measured, OrInfinity
 from grasp_core.messages import MILLI
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions

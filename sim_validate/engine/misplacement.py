@@ -28,7 +28,7 @@ from grasp_core.values import Contact, Grasp
 from scenes.mujoco.held_scene import HeldLayout
 from scenes.mujoco.mjcf_text import quaternion, rotations
 from scenes.mujoco.scene_text import TOUCH_DEPTH
-from sim_validate.engine.traces import rotated
+from sim_validate.engine.held_or_let_go import rotated
 from sim_validate.settings import Noise, OffBy
 
 NOISE_STREAM = 1

@@ -18,6 +18,7 @@ from typing import Annotated, Any, Self
 import numpy as np
 from annotated_types import Interval, Len
 
+from grasp_core.allowed_values import LARGEST, SMALLEST, Seed, Vector
 from grasp_core.arrays import Wrench, frozen_copy, to_digits
 from grasp_core.closure.closure_certificate import ClosureCertificate
 from grasp_core.closure.critical_friction import critical_friction
@@ -28,7 +29,6 @@ from grasp_core.files.file_kinds import WRENCH_FILE
 from grasp_core.files.json_text import object_of, shown
 from grasp_core.files.records import UNRECORDED, from_record
 from grasp_core.files.text_files import read_text
-from grasp_core.kinds import LARGEST, SMALLEST, Seed, Vector
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.reach import Finger
 from grasp_core.settings import CHOSEN, named

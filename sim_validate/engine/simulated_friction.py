@@ -13,10 +13,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from grasp_core.allowed_values import OrInfinity
 from grasp_core.arrays import Array
 from grasp_core.declared import Declared, declared
 from grasp_core.errors import NoForcesError, SolverError, UndecidedError
-from grasp_core.kinds import OrInfinity
 from grasp_core.quality.contact_forces import even_forces
 from scenes.mujoco.closure_scene import GENTLE_SQUEEZE, Scene
 from scenes.mujoco_options import HARD_TIPS, Softness

@@ -20,9 +20,9 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.declared import Declared, declared
+from sim_validate.engine.held_or_let_go import Trace, holds
 from sim_validate.engine.rig import Rig
 from sim_validate.engine.schedules import TrialLoad, part
-from sim_validate.engine.traces import Trace, holds
 
 LATER = 8.0
 """Displacement at the second reading of a ramp, relative to the first; 8 = 2 cubed."""

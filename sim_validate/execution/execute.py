@@ -15,11 +15,11 @@ import numpy as np
 from annotated_types import Interval
 from numpy.typing import ArrayLike
 
+from grasp_core.allowed_values import instance, value_of
 from grasp_core.closure.contacts import contact_arrays, contacts_sha256, listed_contacts, stacked
 from grasp_core.errors import NoForcesError
 from grasp_core.execution.grips import Grip, unsqueezed
 from grasp_core.execution.squeeze_certificate import BestSqueeze
-from grasp_core.kinds import instance, value_of
 from grasp_core.objects.on_faces import check_body, check_on_faces, edge_distance, face_under
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from grasp_core.kinds import one_of
+from grasp_core.allowed_values import one_of
 from scenes.drawing.clips import RATE, write_held_clip
 from scenes.settings import SAMPLE_S
 from sim_validate.execution.confirming import run_trials

@@ -41,11 +41,11 @@ from typing import Any
 
 import numpy as np
 
+from grasp_core.allowed_values import SMALLEST
 from grasp_core.arrays import Array
 from grasp_core.closure.contacts import contact_frictions
 from grasp_core.execution.grips import grip
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
-from grasp_core.kinds import SMALLEST
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.surface import areas_and_normals
 from grasp_core.values import Contact

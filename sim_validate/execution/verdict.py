@@ -11,13 +11,13 @@ from typing import Annotated, Literal, TypeAlias
 
 from pydantic import Field, computed_field
 
+from grasp_core.allowed_values import FLAT, Number, OrInfinity, Quantity, path_of
 from grasp_core.arrays import Array, Shape
 from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError
 from grasp_core.figures import Compared, Shown, cell, figure, less, more
 from grasp_core.files.file_kinds import EXECUTIONS
 from grasp_core.files.records import UNRECORDED
-from grasp_core.kinds import FLAT, Number, OrInfinity, Quantity, path_of
 from grasp_core.messages import MILLI, FieldError
 from grasp_core.solvers.ties import first_best
 from scenes.mujoco_options import PhysicsSettings

@@ -4,9 +4,9 @@ import inspect
 from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar, cast
 
+from grasp_core.allowed_values import inside
 from grasp_core.declared import Declared, declared, types
 from grasp_core.figures import Figure
-from grasp_core.kinds import inside
 
 Own = TypeVar("Own", bound="Kept")
 

@@ -4,11 +4,11 @@ from collections.abc import Mapping
 from dataclasses import field
 from typing import Any, Self, TypeVar
 
+from grasp_core.allowed_values import Friction
 from grasp_core.declared import Declared, declared
 from grasp_core.figures import scalars
 from grasp_core.files.records import RecordFile
 from grasp_core.grasp_tables import ById, Named, frame_of
-from grasp_core.kinds import Friction
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
 

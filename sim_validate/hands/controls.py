@@ -14,18 +14,18 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field, computed_field
 
+from grasp_core.allowed_values import FLAT, SMALLEST, Friction
 from grasp_core.arrays import Array, Shape, rounded, to_digits
 from grasp_core.declared import Declared, declared
 from grasp_core.figures import Shown
-from grasp_core.kinds import FLAT, SMALLEST, Friction
 from grasp_core.quality.motors import Motors
 from grasp_core.quality.wrench_limits import WrenchLimit
 from scenes.mujoco.hand_scenes import HandScene
+from sim_validate.engine.held_or_let_go import LET_GO, HoldVerdict, judge
 from sim_validate.engine.planned_loads import LoadPlanner, PlannedLoad
 from sim_validate.engine.rig import closed_on
 from sim_validate.engine.schedules import TrialLoad, part
 from sim_validate.engine.setup import Setup
-from sim_validate.engine.traces import LET_GO, HoldVerdict, judge
 
 EXCESS = 0.05
 """Share of the applied load, at least, that no forces of a control can balance."""

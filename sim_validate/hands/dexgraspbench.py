@@ -32,6 +32,7 @@ import numpy as np
 from annotated_types import Len
 from pydantic import AfterValidator, Field
 
+from grasp_core.allowed_values import Friction, Quantity, instance, number, path_of, value_of
 from grasp_core.arrays import Array, Shape, to_digits
 from grasp_core.by_value import summary
 from grasp_core.closure.force_closure import force_closure
@@ -45,7 +46,6 @@ from grasp_core.hands.hand import PALM_NAME, Hand
 from grasp_core.hands.hand_arrays import places, tip_jacobians
 from grasp_core.hands.hand_motors import hand_motors
 from grasp_core.hands.reach import HandReach, Stance, stance_of, uncoupled
-from grasp_core.kinds import Friction, Quantity, instance, number, path_of, value_of
 from grasp_core.messages import UnfitError
 from grasp_core.objects.on_faces import check_body, face_under
 from grasp_core.objects.polyhedron import Polyhedron, is_convex

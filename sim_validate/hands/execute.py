@@ -9,13 +9,13 @@ links touch the object where it comes to them.
 from dataclasses import dataclass
 from functools import partial
 
+from grasp_core.allowed_values import instance
 from grasp_core.errors import InputError, NoForcesError
 from grasp_core.execution.grips import Grip, unsqueezed
 from grasp_core.execution.squeeze_certificate import BestSqueeze
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_motors import hand_grip
 from grasp_core.hands.reach import HandReach
-from grasp_core.kinds import instance
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors

@@ -9,9 +9,9 @@ from typing import Annotated
 
 from tyro.conf import Positional, UseAppendAction, arg
 
+from grasp_core.allowed_values import Quantity, TorqueLimit
 from grasp_core.declared import declared
 from grasp_core.hands.settings import ReachSettings
-from grasp_core.kinds import Quantity, TorqueLimit
 from grasp_core.names import HANDS
 from sim_validate.commands.flags import (
     BARE,

@@ -11,6 +11,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import computed_field
 
+from grasp_core.allowed_values import FLAT, NotNegative
 from grasp_core.arrays import UnitVector
 from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError
@@ -20,7 +21,6 @@ from grasp_core.hands.collisions import tip_distances
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach
 from grasp_core.hands.settings import ReachSettings
-from grasp_core.kinds import FLAT, NotNegative
 from sim_validate.execution.verdict import ExecutedGrasp
 from sim_validate.files.result_files import AboutGrasps
 from sim_validate.hands.verdict import HandVerdict

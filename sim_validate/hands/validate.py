@@ -6,11 +6,11 @@ the joint torques of the planned contact forces and are limited as the motors ar
 limits are found in simulation too.
 """
 
+from grasp_core.allowed_values import instance
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import InputError
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach, Stance, stance_of
-from grasp_core.kinds import instance
 from grasp_core.objects.polyhedron import Polyhedron
 from scenes.mujoco.hand_scenes import build_hand_scene, hand_physics
 from scenes.settings import FingerSettings

@@ -5,12 +5,12 @@ from typing import Annotated
 
 from pydantic import Field, computed_field
 
+from grasp_core.allowed_values import Friction, Quantity
 from grasp_core.by_value import summary
 from grasp_core.declared import declared
 from grasp_core.errors import InputError
 from grasp_core.figures import Shown
 from grasp_core.files.records import UNRECORDED
-from grasp_core.kinds import Friction, Quantity
 from scenes.mujoco.hand_scenes import HandScene
 from sim_validate.closure.verdict import HoldsWrenches, WrenchVerdict
 from sim_validate.engine.known_cases import GateCheck

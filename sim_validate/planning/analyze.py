@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import computed_field
 
+from grasp_core.allowed_values import FLAT, Count, Null, OrInfinity, Quantity, Share
 from grasp_core.arrays import Array, Shape, Wrench, to_digits
 from grasp_core.closure.closure_certificate import FAR_BELOW, ClosureCertificate
 from grasp_core.closure.contacts import contact_torsions
@@ -27,7 +28,6 @@ from grasp_core.errors import InputError, NoForcesError, SolverError, UndecidedE
 from grasp_core.figures import NONE, Shown, cell, figures
 from grasp_core.files.file_kinds import ANALYSES
 from grasp_core.files.text_files import read_text
-from grasp_core.kinds import FLAT, Count, Null, OrInfinity, Quantity, Share
 from grasp_core.planning.grasps_json import ContactSet, Overrides, contact_sets_from_json
 from grasp_core.quality.contact_forces import contact_forces
 from grasp_core.quality.ferrari_canny import FerrariCanny, ferrari_canny

@@ -11,13 +11,13 @@ import numpy as np
 from annotated_types import Interval
 from pydantic import computed_field
 
+from grasp_core.allowed_values import Friction, Number, Quantity
 from grasp_core.arrays import Array, Shape, Wrench
 from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError
 from grasp_core.figures import Shown
 from grasp_core.files.file_kinds import BEST
 from grasp_core.files.text_files import write_text
-from grasp_core.kinds import Friction, Number, Quantity
 from grasp_core.names import Family, MeasureName
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.optimizing.best_grasp import (

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import computed_field
 
+from grasp_core.allowed_values import FLAT, Count, NotNegative, Share, number, path_of
 from grasp_core.arrays import Array, Shape, frozen, frozen_units
 from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.closure.force_closure import force_closure
@@ -24,7 +25,6 @@ from grasp_core.errors import InputError, SolverError, about
 from grasp_core.figures import Shown, figures
 from grasp_core.files.file_kinds import REGIONS
 from grasp_core.geometry.polygons import FEWEST_CORNERS, edge_rows, plane_frame
-from grasp_core.kinds import FLAT, Count, NotNegative, Share, number, path_of
 from grasp_core.messages import MILLI
 from grasp_core.names import Family
 from grasp_core.objects.face_pieces import inscribed_radius

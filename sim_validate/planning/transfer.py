@@ -5,12 +5,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Self
 
+from grasp_core.allowed_values import FLAT
 from grasp_core.by_value import counted
 from grasp_core.declared import declared
 from grasp_core.errors import InputError
 from grasp_core.files.file_kinds import GRASPS, TRANSFER
 from grasp_core.files.text_files import write_text
-from grasp_core.kinds import FLAT
 from grasp_core.mesh_files.limits import MeshChoices
 from grasp_core.messages import MILLI
 from grasp_core.objects.on_faces import check_planar

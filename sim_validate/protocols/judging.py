@@ -23,10 +23,10 @@ from functools import partial
 
 import numpy as np
 
+from grasp_core.allowed_values import Friction, instance, one_of, value_of
 from grasp_core.arrays import Array
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach, stance_of
-from grasp_core.kinds import Friction, instance, one_of, value_of
 from grasp_core.messages import MILLI
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
@@ -37,13 +37,13 @@ from scenes.mujoco.hand_scenes import build_hand_scene
 from scenes.mujoco.mjcf_text import IDENTITY_POSE
 from scenes.mujoco.published_tests import TestedObject, TestedScene
 from sim_validate.engine.gate import ClosureCase
+from sim_validate.engine.held_or_let_go import Outcome, judge, rotation_angles
 from sim_validate.engine.known_cases import checked, untouching
 from sim_validate.engine.planned_loads import LoadPlanner
 from sim_validate.engine.rig import closed_on
 from sim_validate.engine.schedules import samples
 from sim_validate.engine.setup import Setup
 from sim_validate.engine.stepping import Bench, Motion, Told
-from sim_validate.engine.traces import Outcome, judge, rotation_angles
 from sim_validate.execution.execute import given_contacts
 from sim_validate.hands.dexgraspbench import RecordedReach, hand_file, recorded_postures
 from sim_validate.hands.known_hand import KnownHand

@@ -12,10 +12,10 @@ from typing import TypeAlias
 
 import numpy as np
 
+from grasp_core.allowed_values import Number, OrInfinity, one_of
 from grasp_core.arrays import Array
 from grasp_core.by_value import summary
 from grasp_core.declared import Declared, declared
-from grasp_core.kinds import Number, OrInfinity, one_of
 from grasp_core.objects.polyhedron import Polyhedron
 from scenes.mujoco.chains import Weld
 from scenes.mujoco_options import PhysicsSettings

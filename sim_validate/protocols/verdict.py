@@ -5,12 +5,12 @@ from typing import Annotated
 
 from pydantic import Field, computed_field
 
+from grasp_core.allowed_values import FLAT, Friction, Measured, Number, OrInfinity, Quantity
 from grasp_core.by_value import summary
 from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError
 from grasp_core.figures import Shown
 from grasp_core.files.file_kinds import JUDGEMENTS
-from grasp_core.kinds import FLAT, Friction, Measured, Number, OrInfinity, Quantity
 from sim_validate.files.result_files import AboutObject, ResultFile
 from sim_validate.protocols.published import PublishedProtocol
 

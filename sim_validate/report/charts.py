@@ -24,11 +24,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from grasp_core.allowed_values import Quantity, instance, value_of
 from grasp_core.arrays import Array, Indices
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.errors import InputError
-from grasp_core.kinds import Quantity, instance, value_of
 from grasp_core.messages import MICRO, MILLI
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.ferrari_canny import ferrari_canny
@@ -62,7 +62,7 @@ from scenes.settings import FingerSettings
 from sim_validate.closure.controls import ControlTrial
 from sim_validate.closure.replaying import Replayed
 from sim_validate.closure.verdict import AGREEMENT, Verdict, WrenchVerdict
-from sim_validate.engine.traces import LET_GO, Outcome
+from sim_validate.engine.held_or_let_go import LET_GO, Outcome
 
 LONGITUDES, LATITUDES = 21, 11
 """Numbers of a map's nodes: around, where the first is also the last, and from pole to pole."""

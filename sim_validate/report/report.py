@@ -11,13 +11,13 @@ from typing import Any, cast
 
 import numpy as np
 
+from grasp_core.allowed_values import Count, Number, function, path_of, value_of
 from grasp_core.arrays import Array
 from grasp_core.cones.spanning import angles_between
 from grasp_core.figures import figures, table
 from grasp_core.files.file_kinds import GRASPS
 from grasp_core.files.records import record_of
 from grasp_core.files.text_files import write_text
-from grasp_core.kinds import Count, Number, function, path_of, value_of
 from grasp_core.messages import MILLI
 from grasp_core.provenance import versions
 from grasp_core.values import Grasp

@@ -15,7 +15,7 @@ from grasp_core.planning.result import Plan
 from grasp_core.values import Grasp
 from scenes.drawing.hands import PosedHand, posed_hand
 from sim_validate.closure.verdict import Verdict, Verdicts
-from sim_validate.engine.traces import LET_GO, Outcome
+from sim_validate.engine.held_or_let_go import LET_GO, Outcome
 from sim_validate.execution.verdict import ExecutedGrasp, Executions
 from sim_validate.planning.best import Best
 from sim_validate.planning.regions import GraspRegions, Regions

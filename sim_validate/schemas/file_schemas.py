@@ -17,11 +17,11 @@ from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 from tyro.conf import Positional
 
+from grasp_core.allowed_values import adapter, rules
 from grasp_core.errors import InputError
 from grasp_core.figures import meanings, unit_of
 from grasp_core.files import file_kinds as files
 from grasp_core.files.records import entries
-from grasp_core.kinds import adapter, rules
 from grasp_core.messages import near, shown
 from grasp_core.settings import CHOSEN
 from sim_validate.commands.flag_values import flags_of

@@ -1,6 +1,6 @@
 """Group 6: numbers of physics that nothing in the world has, as flags and in files."""
 
-from grasp_core.kinds import LARGEST_FRICTION, MOST_EDGES, MOST_SEED
+from grasp_core.allowed_values import LARGEST_FRICTION, MOST_EDGES, MOST_SEED
 from tests.bad_input.cases import Case, refused
 from tests.bad_input.good_files import changed, good
 

@@ -24,13 +24,13 @@ from grasp_core.closure.contacts import contact_frictions, contact_torsions
 from grasp_core.quality.wrench_limits import WrenchBody, limit_of
 from scenes.mujoco_options import PhysicsSettings
 from sim_validate.closure.controls import negative_controls, try_control
+from sim_validate.engine.held_or_let_go import Outcome, judge
 from sim_validate.engine.rig import squeezed
 from sim_validate.engine.schedules import TrialLoad, part
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.engine.simulated_friction import released_friction
 from sim_validate.engine.simulated_limits import bisected_limits, ramped_limits
 from sim_validate.engine.stepping import Bench
-from sim_validate.engine.traces import Outcome, judge
 from sim_validate.processes.workers import available_cores, each
 from tests.benchmarks.objects import FAMILIES
 from tests.grasp_core.long_shapes import MM, with_holes

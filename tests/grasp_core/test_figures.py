@@ -7,7 +7,7 @@ import pytest
 from grasp_core.figures import Shown, cell, figures
 from grasp_core.values import Grasp
 from sim_validate.closure.verdict import Verdict
-from sim_validate.engine.traces import HoldVerdict
+from sim_validate.engine.held_or_let_go import HoldVerdict
 from sim_validate.execution.verdict import Execution, ExecutionTrial
 from sim_validate.planning.best import Rated
 from sim_validate.planning.regions import GraspRegions

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from annotated_types import Interval
 
+from grasp_core.allowed_values import Direction, Vector, ending
 from grasp_core.declared import declared
 from grasp_core.errors import InputError
-from grasp_core.kinds import Direction, Vector, ending
 from grasp_core.messages import FieldError
 from grasp_core.settings import CHOSEN, Settings, for_users
 

@@ -4,8 +4,8 @@ import math
 from pkgutil import resolve_name
 from typing import get_args, get_origin
 
+from grasp_core.allowed_values import value_of
 from grasp_core.errors import InputError
-from grasp_core.kinds import value_of
 from sim_validate.commands.flag_values import flags_of, parts_of
 from sim_validate.commands.table import COMMANDS
 

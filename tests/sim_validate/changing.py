@@ -4,7 +4,7 @@ import json
 from dataclasses import replace
 
 from sim_validate.closure.verdict import Verdicts
-from sim_validate.engine.traces import Outcome
+from sim_validate.engine.held_or_let_go import Outcome
 
 
 def changed(path, change):

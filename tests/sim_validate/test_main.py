@@ -23,7 +23,7 @@ from sim_validate.commands.exit_codes import Exit
 from sim_validate.commands.flags import CLIP_TYPES, PAGE_TYPES, PICTURE_TYPES, ProtocolName
 from sim_validate.commands.table import EXAMPLES, GROUPS
 from sim_validate.datasets.config import BuiltInHand
-from sim_validate.engine.traces import HoldVerdict, Outcome
+from sim_validate.engine.held_or_let_go import HoldVerdict, Outcome
 from sim_validate.main import main
 from sim_validate.processes import workers
 from sim_validate.protocols.published import PROTOCOLS

@@ -6,11 +6,11 @@ from typing import Annotated
 import pytest
 from pydantic import computed_field
 
+from grasp_core.allowed_values import FLAT, OrInfinity
 from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError
 from grasp_core.figures import Shown, scalars, table
 from grasp_core.files.records import from_record, record_of
-from grasp_core.kinds import FLAT, OrInfinity
 
 
 @declared

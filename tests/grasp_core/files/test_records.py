@@ -12,11 +12,20 @@ from annotated_types import Len
 from pydantic import Field, computed_field
 
 import grasp_core as gc
+from grasp_core.allowed_values import (
+    FLAT,
+    Count,
+    Direction,
+    Measured,
+    OrInfinity,
+    Quantity,
+    Seed,
+    Vector,
+)
 from grasp_core.arrays import Array, Indices, Point, Shape, UnitVector
 from grasp_core.declared import Declared, declared
 from grasp_core.files.json_text import json_of
 from grasp_core.files.records import UNRECORDED, RecordFile, from_record, record_of
-from grasp_core.kinds import FLAT, Count, Direction, Measured, OrInfinity, Quantity, Seed, Vector
 from tests.damaged import check_refused, optional_keys, value_at
 
 

@@ -8,7 +8,7 @@ import grasp_core as gc
 import sim_validate as sv
 from grasp_core.files.text_files import write_text
 from sim_validate.baselines.baseline import Baseline, KeptGrasp, read_baseline, write_baseline
-from sim_validate.engine.traces import Outcome
+from sim_validate.engine.held_or_let_go import Outcome
 from tests.sim_validate.baselines.test_compare import BEFORE, ENTRY, entry
 from tests.sim_validate.changing import at, changed
 from tests.sim_validate.rigs import grasps

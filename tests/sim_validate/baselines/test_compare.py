@@ -7,8 +7,8 @@ import pytest
 
 from sim_validate.baselines.baseline import Baseline, How, KeptGrasp, VerdictFigures
 from sim_validate.baselines.compare import OTHER_VERSIONS, Carried, Status, compare, failing
+from sim_validate.engine.held_or_let_go import Outcome
 from sim_validate.engine.setup import Agenda, NamedWrench, Setup
-from sim_validate.engine.traces import Outcome
 from sim_validate.files.result_files import AboutObject
 from sim_validate.settings import HoldProtocol
 

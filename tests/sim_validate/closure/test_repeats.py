@@ -11,10 +11,10 @@ import sim_validate as sv
 from grasp_core.objects.on_faces import face_under
 from sim_validate.closure.validate import noisy_trial
 from sim_validate.closure.verdict import interval
+from sim_validate.engine.held_or_let_go import Outcome
 from sim_validate.engine.misplacement import disturbed
 from sim_validate.engine.rig import squeezed
 from sim_validate.engine.setup import Agenda, NamedWrench, Setup
-from sim_validate.engine.traces import Outcome
 from sim_validate.settings import Noise
 from tests.sim_validate.rigs import grasps
 

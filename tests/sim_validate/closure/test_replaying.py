@@ -8,8 +8,8 @@ import grasp_core as gc
 import sim_validate as sv
 from sim_validate.closure.replaying import Recorded, replayed
 from sim_validate.commands.exit_codes import Exit
+from sim_validate.engine.held_or_let_go import Outcome
 from sim_validate.engine.setup import Agenda, NamedWrench, Setup
-from sim_validate.engine.traces import Outcome
 from sim_validate.main import main
 from sim_validate.settings import Noise
 from tests.sim_validate.rigs import grasps, plan_with_a_bad_grasp

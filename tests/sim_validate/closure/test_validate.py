@@ -15,10 +15,10 @@ from sim_validate.closure.controls import negative_controls
 from sim_validate.closure.verdict import Verdicts, trace_arrays
 from sim_validate.commands.exit_codes import Exit
 from sim_validate.engine.gate import ClosureCase
+from sim_validate.engine.held_or_let_go import Outcome
 from sim_validate.engine.known_cases import measured
 from sim_validate.engine.rig import Rig
 from sim_validate.engine.setup import Agenda, NamedWrench, Setup
-from sim_validate.engine.traces import Outcome
 from tests.sim_validate.rigs import grasps, plan_with_a_bad_grasp
 
 WITHOUT_CONTROLS = Agenda(controls=False)

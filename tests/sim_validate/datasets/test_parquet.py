@@ -14,7 +14,7 @@ from sim_validate.datasets.config import KEYS, DatasetConfig
 from sim_validate.datasets.making_rows import made_of, split_of
 from sim_validate.datasets.parquet import TableColumn, agrees, each_batch, parquet_bytes, read_table
 from sim_validate.datasets.work_units import body_of, units_of
-from sim_validate.engine.traces import HoldVerdict
+from sim_validate.engine.held_or_let_go import HoldVerdict
 
 pytest.importorskip("pyarrow")
 

@@ -8,19 +8,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.sim_validate.engine.test_traces import pose
 
 import grasp_core as gc
 from sim_validate.closure.controls import control_case, negative_controls
+from sim_validate.engine.held_or_let_go import LEAST_WATCHED_SAMPLES, USABLE, EarlyEnds, judge
 from sim_validate.engine.planned_loads import LoadPlanner
 from sim_validate.engine.rig import squeezed
 from sim_validate.engine.schedules import Thresholds, part
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.engine.simulated_friction import forces_just_above
 from sim_validate.engine.stepping import Bench
-from sim_validate.engine.traces import LEAST_WATCHED_SAMPLES, USABLE, EarlyEnds, judge
 from sim_validate.settings import HoldProtocol
 from tests.marks import more
-from tests.sim_validate.engine.test_traces import pose
 from tests.sim_validate.rigs import grasps, limiting_loads
 
 SAMPLE_S = 0.01

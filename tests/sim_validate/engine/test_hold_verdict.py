@@ -3,8 +3,8 @@ import re
 import numpy as np
 import pytest
 
+from sim_validate.engine.held_or_let_go import Outcome, Trace, judge
 from sim_validate.engine.stepping import Health
-from sim_validate.engine.traces import Outcome, Trace, judge
 from sim_validate.settings import HoldProtocol
 
 

@@ -11,9 +11,9 @@ import grasp_core as gc
 from grasp_core.arrays import to_digits
 from scenes.mujoco.silent_mujoco import unlogged
 from sim_validate.engine import stepping
+from sim_validate.engine.held_or_let_go import Outcome, judge
 from sim_validate.engine.schedules import TrialLoad, part
 from sim_validate.engine.stepping import CLOSURE_STEPS, Bench, compiled
-from sim_validate.engine.traces import Outcome, judge
 from sim_validate.settings import HoldProtocol
 from tests.sim_validate.rigs import limiting_loads
 

@@ -15,10 +15,10 @@ from scenes.drawing.sheets import BAD_HEX, GOOD_HEX, LEVELS, Area, Dots, Image, 
 from sim_validate.closure.controls import ControlTrial
 from sim_validate.closure.replaying import Recorded, replayed
 from sim_validate.closure.verdict import WrenchVerdict
+from sim_validate.engine.held_or_let_go import HoldVerdict, Outcome
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.engine.simulated_friction import CriticalFriction
 from sim_validate.engine.simulated_limits import SimulatedLimit
-from sim_validate.engine.traces import HoldVerdict, Outcome
 from sim_validate.report.charts import (
     Agreement,
     as_predicted,

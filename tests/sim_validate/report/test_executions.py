@@ -15,7 +15,7 @@ from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.planning.grasps_json import load_grasps
 from scenes.mujoco_options import PhysicsSettings
 from sim_validate.commands.exit_codes import Exit
-from sim_validate.engine.traces import Outcome
+from sim_validate.engine.held_or_let_go import Outcome
 from sim_validate.execution.command import execution_settings
 from sim_validate.execution.verdict import (
     ExecutedGrasp,

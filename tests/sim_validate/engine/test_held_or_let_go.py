@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from scenes.mujoco.mjcf_text import quaternion
+from sim_validate.engine.held_or_let_go import rotation_angles, traces
 from sim_validate.engine.stepping import Health, Motion
-from sim_validate.engine.traces import rotation_angles, traces
 from tests.judges import random_rotation
 
 

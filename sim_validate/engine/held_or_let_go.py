@@ -62,11 +62,11 @@ from typing import Annotated, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from grasp_core.allowed_values import Measured
 from grasp_core.arrays import Array, Indices, Shape, cross
 from grasp_core.closure.contacts import cross_matrix, normal_and_tangential
 from grasp_core.declared import Declared, declared
 from grasp_core.figures import Shown
-from grasp_core.kinds import Measured
 from grasp_core.messages import MICRO, MILLI
 from grasp_core.objects.on_faces import within
 from scenes.mujoco.closure_scene import Layout, grasp_size
