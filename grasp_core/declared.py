@@ -7,8 +7,8 @@
         normal: UnitVector
         \"\"\"Unit vector into the object.\"\"\"
 
-The constructor checks each field by its type (see `allowed_values`) and keeps it in plain form: arrays
-copied and read-only. `is_sound` checks a value again that may come from anywhere.
+The constructor checks each field by its type (see `allowed_values`) and keeps it in plain form:
+arrays copied and read-only. `is_sound` checks a value again that may come from anywhere.
 """
 
 from collections.abc import Callable, Mapping

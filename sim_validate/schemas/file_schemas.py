@@ -155,7 +155,7 @@ class _OfFiles(GenerateJsonSchema):
     def function_before_schema(
         self, schema: core_schema.BeforeValidatorFunctionSchema
     ) -> JsonSchemaValue:
-        """Say how many items a list has, which `kinds` checks before pydantic does."""
+        """Say how many items a list has, which `allowed_values` checks before pydantic does."""
         made = super().function_before_schema(schema)
         least, most = getattr(schema["function"]["function"], "args", (0, None))
         made |= {"minItems": least} if least else {}
