@@ -1,8 +1,6 @@
 """Runs the command `run`, which plans grasps, simulates them and writes all results."""
 
 import re
-from collections.abc import Generator
-from contextlib import contextmanager
 from pathlib import Path
 
 from grasp_core.errors import GraspError
@@ -18,6 +16,7 @@ from sim_validate.commands import simulation_flags
 from sim_validate.commands.console import Reporter
 from sim_validate.commands.exit_codes import Exit, reason_of
 from sim_validate.commands.flags import ReportFlags
+from sim_validate.engine.setup import Setup
 from sim_validate.execution.command import execute_grasps, execution_settings, refuse_executing
 from sim_validate.files.output_folders import alone_in
 from sim_validate.files.results_folder import REPORT, remove_results, require_report_folder
@@ -50,14 +49,15 @@ def run_object(command: simulation_flags.RunFlags, reporter: Reporter) -> int:
     jobs, seed, finger = testing.jobs, planning.seed, asked_finger(planning)
     if not command.execute:
         refuse_executing(executing)
-    setup, agenda = prepared(testing, finger, seed, command.out or RESULTS)
+    setup, agenda = prepared(testing, finger, seed)
     body = object_to_plan(command.object, planning, reporter)
     execution = execution_settings(executing, body, seed, finger) if command.execute else None
     folder = command.out or RESULTS / _folder_name(body)
+    pages = None if command.no_report else folder
     with alone_in(folder):
-        if not command.no_report:
-            require_report_folder(folder / REPORT)
-        checked_for(body, planning.friction, agenda, setup)
+        if pages is not None:
+            require_report_folder(pages / REPORT)
+        checked_for(body, planning.friction, agenda, setup)  # refuses before it takes minutes
         ready(jobs, reporter)
         stop, later = Stop(seconds=planning.time_limit_s), 1 + command.execute
         with interrupts_end(stop):
@@ -71,22 +71,24 @@ def run_object(command: simulation_flags.RunFlags, reporter: Reporter) -> int:
             return ended or Exit.NONE
         if stop.asked:
             return Exit.INTERRUPTED
-        for grasp in found.grasps:
-            scene = setup.scene(body, grasp, found.friction)
-            write_text(folder / "scenes" / f"{grasp.id}.xml", scene.xml)
+        _write_scenes(found, setup, folder / "scenes")
         simulated, verdicts = simulate_grasps(
             found, setup, agenda, jobs=jobs, folder=folder, reporter=reporter, stop=stop.part(later)
         )
         reporter.say(f"results in {folder}/: grasps.json, verdicts.json, scenes/")
-        with _reported(None if command.no_report else folder, jobs, reporter):
-            document, complete, survived = verdicts.document(), verdicts.complete, Exit.GOOD
+        document, complete, survived = verdicts.document(), verdicts.complete, Exit.GOOD
+        try:
             if execution is not None:
                 survived, executions = execute_grasps(
                     found, execution, jobs=jobs, folder=folder, reporter=reporter, stop=stop
                 )
                 document["executions"] = executions.document()
                 complete = complete and executions.complete
-            reporter.document(document)
+        except GraspError:  # the other results are complete, so that pages can show them
+            _write_pages(pages, jobs, reporter)
+            raise
+        reporter.document(document)
+        _write_pages(pages, jobs, reporter)
     if not complete:
         reporter.warn("the time limit ended the trials: not all grasps have results")
         ended = Exit.PARTIAL
@@ -104,21 +106,20 @@ def _show_plan(body: Polyhedron, found: Plan, folder: Path, reporter: Reporter) 
     return code
 
 
-@contextmanager
-def _reported(folder: Path | None, jobs: int, reporter: Reporter) -> Generator[None, None, None]:
-    """Write results as pages after the last of them; a page that fails only gives a warning."""
-    failed: GraspError | None = None
+def _write_scenes(found: Plan, setup: Setup, folder: Path) -> None:
+    for grasp in found.grasps:
+        scene = setup.scene(found.body, grasp, found.friction)
+        write_text(folder / f"{grasp.id}.xml", scene.xml)
+
+
+def _write_pages(folder: Path | None, jobs: int, reporter: Reporter) -> None:
+    """Write the results of a folder as pages; if they fail, that is only a warning."""
+    if folder is None:
+        return
     try:
-        yield
-    except GraspError as error:  # the other results are complete, so that pages can show them
-        failed = error
-    try:
-        if folder is not None:
-            shown_report(ReportFlags(folder, limit=REPORTED, jobs=jobs), reporter)
+        shown_report(ReportFlags(folder, limit=REPORTED, jobs=jobs), reporter)
     except (GraspError, OSError) as error:
         reporter.warn(f"no report: {reason_of(error)}")
-    if failed is not None:
-        raise failed
 
 
 def _folder_name(body: Polyhedron) -> str:

@@ -1,7 +1,8 @@
 """Lists what versions of MuJoCo lack or compute wrongly.
 
 Scenes run on MuJoCo 3.17, the first version with `mujoco.batch`, to 4.x. Whether the installed one
-is faithful is measured on cases with known answers (`sim_validate.engine.gate`), not looked up.
+is faithful is measured on cases with known answers (`sim_validate.engine.known_cases`), not looked
+up.
 """
 
 import re

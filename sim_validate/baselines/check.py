@@ -22,7 +22,7 @@ from scenes.settings import FingerSettings
 from sim_validate.baselines.baseline import Baseline, How, KeptGrasp, write_baseline
 from sim_validate.baselines.compare import WORDS, Carried, Finding, Status, bands_between, compare
 from sim_validate.baselines.part import Present
-from sim_validate.closure.validate import checked_for, proved_and_tested
+from sim_validate.closure.validate import checked_for, validated_grasp
 from sim_validate.closure.verdict import Verdict, WrenchVerdict
 from sim_validate.engine.setup import (
     AXIS_NAMES,
@@ -88,8 +88,8 @@ def measured(
     setup = replace(how.setup.for_body(saved.body), threads=processors // count)
     gate = checked_for(saved.body, saved.friction, how.agenda, setup)
     validating = partial(
-        proved_and_tested, saved.body, friction=saved.friction, gate=gate, agenda=how.agenda,
-        setup=setup,
+        validated_grasp, saved.body, friction=saved.friction, gate=gate, agenda=how.agenda,
+        setup=setup, refused=(),
     )  # fmt: skip
     answers = chain(
         each(partial(_or_refusal, validating, ""), chosen, jobs=count),

@@ -3,7 +3,8 @@
 For each test wrench the analysis predicts the largest multiple that is resisted. A share of it is
 applied in simulation, with forces between those at rest and those at the limit. The critical
 friction is found in simulation too, and on request the limits. The grasp is confirmed when all
-wrenches hold. The run can be trusted when the simulator is faithful (`gate`) and no control holds.
+wrenches hold. The run can be trusted when the simulator is faithful (`known_cases`) and no control
+holds.
 
 On request the trials are repeated with seeded noise, to count how often the grasp still holds.
 The fingers come along their planned lines, but the object is displaced (see `misplacement`). Where
@@ -14,7 +15,7 @@ drawn number. Loads turn with the object. Every grasp gets the same draws.
 The analysis says which loads the disturbed grasp resists, and simulation applies them all with
 forces planned for the disturbed contacts. So a repeat asks whether the grasp can still hold, not
 whether fingers notice the change. Contacts that noise takes out of force closure are tested as a
-negative control: they must let go. LoadPlanner and simulation must agree in every repeat. The share
+negative control: they must let go. Analysis and simulation must agree in every repeat. The share
 that holds has a confidence interval.
 """
 
@@ -44,7 +45,7 @@ from sim_validate.closure.verdict import (
     Verdict,
     WrenchVerdict,
 )
-from sim_validate.engine.gate import ClosureCase
+from sim_validate.engine.closure_cases import ClosureCase
 from sim_validate.engine.held_or_let_go import LET_GO, HoldVerdict, Outcome, judge
 from sim_validate.engine.known_cases import Gate, checked, untouching
 from sim_validate.engine.misplacement import Disturbed, disturbed
@@ -79,14 +80,14 @@ def validate(
         InputError: The contacts are not on the body's faces, or not closed at this friction.
         UnfaithfulError: The simulator fails its checks with these settings.
     """
-    agenda, setup = asked_for(agenda, setup)
+    agenda, setup = with_defaults(agenda, setup)
     proved = proved_closed(body, grasp, friction, setup)
     setup = setup.for_body(body)
     gate = checked_for(body, friction, agenda, setup)
     return tested(body, proved, friction, gate, agenda, setup)
 
 
-def asked_for(agenda: Agenda | None, setup: Setup | None) -> tuple[Agenda, Setup]:
+def with_defaults(agenda: Agenda | None, setup: Setup | None) -> tuple[Agenda, Setup]:
     """Check which trials are asked for and how they are simulated; None stands for the defaults."""
     return (
         Agenda() if agenda is None else instance(agenda, Agenda, "agenda"),
@@ -205,7 +206,7 @@ def simulated_critical_friction(
         UnfaithfulError: The simulator fails its checks with these settings.
     """
     check_on_faces(body, grasp)
-    setup = asked_for(None, setup)[1].for_body(body)
+    setup = with_defaults(None, setup)[1].for_body(body)
     predicted = setup.critical_friction(grasp)
     if not np.isfinite(predicted):
         raise InputError(f"grasp {grasp.id}: no friction gives force closure; choose another grasp")
@@ -258,7 +259,7 @@ def validate_all(
     value_of(Friction, friction, "friction")
     kind = partial(instance, kind=Grasp, name="grasps")
     listed = several(grasps, kind, "grasps", "Grasp values")
-    agenda, setup = asked_for(agenda, setup)
+    agenda, setup = with_defaults(agenda, setup)
     value_of(Count, jobs, "jobs")
     if progress is not None:
         function(progress, "progress")
@@ -280,27 +281,22 @@ def validated(
     """Yield one verdict per grasp, in order; the number of processors does not change results."""
     count = processes(len(grasps), jobs)
     setup = replace(setup.for_body(body), threads=max(setup.threads, jobs // count))
-    work = partial(attempted, body, friction=friction, gate=gate, agenda=agenda, setup=setup)
+    work = partial(validated_grasp, body, friction=friction, gate=gate, agenda=agenda, setup=setup)
     return each(work, grasps, jobs=count)
 
 
-def proved_and_tested(
-    body: Polyhedron, grasp: Grasp, *, friction: float, gate: Gate, agenda: Agenda, setup: Setup
-) -> Verdict:
-    """Test a grasp with a simulator that was checked before."""
-    proved = proved_closed(body, grasp, friction, setup)
-    return tested(body, proved, friction, gate, agenda, setup)
+def validated_grasp(
+    body: Polyhedron, grasp: Grasp, *, friction: float, gate: Gate, agenda: Agenda, setup: Setup,
+    refused: tuple[type[Exception], ...] = OWN_FAULTS,
+) -> Verdict:  # fmt: skip
+    """Validate one of several grasps; if an error in `refused` says why not, that is its verdict.
 
-
-def attempted(
-    body: Polyhedron, grasp: Grasp, *, friction: float, gate: Gate, agenda: Agenda, setup: Setup
-) -> Verdict:
-    """Validate one of several grasps; the reason why it cannot be is a verdict, too."""
+    The simulator was checked before.
+    """
     try:
-        return proved_and_tested(
-            body, grasp, friction=friction, gate=gate, agenda=agenda, setup=setup
-        )
-    except OWN_FAULTS as error:
+        proved = proved_closed(body, grasp, friction, setup)
+        return tested(body, proved, friction, gate, agenda, setup)
+    except refused as error:
         reason = str(error)
     scene = setup.scene(body, grasp, friction)  # refuses what suits no grasp
     nothing = np.full(len(grasp.contacts), np.nan)

@@ -111,7 +111,7 @@ COMMANDS: Mapping[str, Command] = {
         "Print the JSON Schema of a kind of files, or list the kinds of files.",
     ),
     "doctor": Command(
-        "commands.flags:DoctorFlags", "closure.command:check_installation",
+        "commands.flags:DoctorFlags", "doctor:check_installation",
         "Check this installation: versions, solvers and simulator.",
     ),
 }  # fmt: skip

@@ -2,5 +2,5 @@
 
 `stepping` alone steps the simulator. `rig` closes fingers and schedules trials; `held_or_let_go`
 judges how they ended. `simulated_limits` and `simulated_friction` search for the largest wrenches
-and the least friction; `gate` first has all give known answers.
+and the least friction; `closure_cases` first has all give known answers.
 """

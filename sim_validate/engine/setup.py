@@ -46,7 +46,7 @@ NAME = re.compile(r"[\w+\- ]{1,100}")
 WEAKEST = "weakest"
 RANDOM = "random_{}"
 MOST_THREADS = 1024
-HARD_FINGER = 3
+HARD_CONDIM = 3
 """MuJoCo's `condim` of a contact whose force has a normal and two tangential parts."""
 
 
@@ -82,9 +82,9 @@ class Setup(ScaledScene):
                 "would not be the object's weight; give the weight as a wrench (--weight-n, or "
                 "Agenda.wrenches)"
             )
-        if physics.condim != HARD_FINGER:
+        if physics.condim != HARD_CONDIM:
             raise InputError(
-                f"physics.condim must be {HARD_FINGER}, got {physics.condim}: predictions are for "
+                f"physics.condim must be {HARD_CONDIM}, got {physics.condim}: predictions are for "
                 "hard fingers, whose contacts have friction and no torsion; for soft ones give "
                 "physics.torsion_m"
             )

@@ -2,8 +2,8 @@
 
 The squeeze is chosen once: the one that carries the most of the object's weight in any direction
 with the largest push allowed. Every trial then runs with it. Before, the simulator is checked on
-cases whose answers are known (see `gate`). Several grasps of an object are executed in one process
-or in several.
+cases whose answers are known (see `held_cases`). Several grasps of an object are executed in one
+process or in several.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -29,7 +29,7 @@ from scenes.mujoco_options import PhysicsSettings
 from sim_validate.engine.known_cases import checked
 from sim_validate.engine.setup import MOST_THREADS
 from sim_validate.execution.confirming import confirmed_trials, with_first_slips
-from sim_validate.execution.gate import cases_of
+from sim_validate.execution.held_cases import cases_of
 from sim_validate.execution.predictions import Holder, NoSqueezeError, found_enough, planned
 from sim_validate.execution.simulate import HeldBench
 from sim_validate.execution.trials import run_controls

@@ -13,6 +13,7 @@ from pydantic import Field, computed_field
 
 from grasp_core.allowed_values import FLAT, Number, OrInfinity, Quantity, path_of
 from grasp_core.arrays import Array, Shape
+from grasp_core.closure.contacts import LEAST_CONTACTS
 from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError
 from grasp_core.figures import Compared, Shown, cell, figure, less, more
@@ -33,7 +34,6 @@ CLEAR_OF_SLIP = 1.05
 """Predicted first slip from which on no contact slips, however processors round."""
 
 
-SQUEEZE_CONTACTS = 2
 MULTIPLE_FORM = ".2f"
 DEGREES = math.degrees(1.0)
 NO_MOTION = "-"
@@ -191,7 +191,7 @@ class Execution(Declared):
     or it was not asked for."""
 
     def _check_together(self) -> None:
-        if len(self.squeeze) < SQUEEZE_CONTACTS:
+        if len(self.squeeze) < LEAST_CONTACTS:
             raise FieldError("squeeze", "must have a force for each contact, at least two, got "
                              f"{len(self.squeeze)}")  # fmt: skip
 

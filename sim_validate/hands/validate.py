@@ -15,7 +15,7 @@ from grasp_core.objects.polyhedron import Polyhedron
 from scenes.mujoco.hand_scenes import build_hand_scene, hand_physics
 from scenes.settings import FingerSettings
 from sim_validate.closure.validate import held_wrenches
-from sim_validate.engine.gate import ClosureCase
+from sim_validate.engine.closure_cases import ClosureCase
 from sim_validate.engine.known_cases import checked
 from sim_validate.engine.rig import closed_on
 from sim_validate.engine.setup import WEAKEST, Agenda, Setup

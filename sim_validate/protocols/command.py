@@ -11,7 +11,7 @@ from grasp_core.planning.result import Plan
 from sim_validate.closure.command import prepared, simulate_grasps
 from sim_validate.commands import simulation_flags
 from sim_validate.commands.console import TABLE_ROWS, Reporter
-from sim_validate.commands.exit_codes import Exit
+from sim_validate.commands.exit_codes import Exit, FlagsError
 from sim_validate.files.output_folders import alone_in
 from sim_validate.files.result_files import AboutObject
 from sim_validate.files.results_folder import remove_results
@@ -31,7 +31,9 @@ def validate_file(command: simulation_flags.ValidateFlags, reporter: Reporter) -
     )
     if chosen is None:
         return Exit.NONE
-    setup, agenda = prepared(command.testing, chosen.finger, chosen.seed, command.out)
+    if command.testing.traces and command.out is None:
+        raise FlagsError("--traces writes files: give their folder with --out DIR too")
+    setup, agenda = prepared(command.testing, chosen.finger, chosen.seed)
     jobs, folder = command.testing.jobs, command.out
     with alone_in(folder):
         if command.protocol:

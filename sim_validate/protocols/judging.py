@@ -36,7 +36,7 @@ from scenes.mujoco.fingertips import Slides
 from scenes.mujoco.hand_scenes import build_hand_scene
 from scenes.mujoco.mjcf_text import IDENTITY_POSE
 from scenes.mujoco.published_tests import TestedObject, TestedScene
-from sim_validate.engine.gate import ClosureCase
+from sim_validate.engine.closure_cases import ClosureCase
 from sim_validate.engine.held_or_let_go import Outcome, judge, rotation_angles
 from sim_validate.engine.known_cases import checked, untouching
 from sim_validate.engine.planned_loads import LoadPlanner

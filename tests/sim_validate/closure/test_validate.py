@@ -14,7 +14,7 @@ from sim_validate.closure import validate as validating
 from sim_validate.closure.controls import negative_controls
 from sim_validate.closure.verdict import Verdicts, trace_arrays
 from sim_validate.commands.exit_codes import Exit
-from sim_validate.engine.gate import ClosureCase
+from sim_validate.engine.closure_cases import ClosureCase
 from sim_validate.engine.held_or_let_go import Outcome
 from sim_validate.engine.known_cases import measured
 from sim_validate.engine.rig import Rig

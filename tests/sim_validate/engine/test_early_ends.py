@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.sim_validate.engine.test_traces import pose
 
 import grasp_core as gc
 from sim_validate.closure.controls import control_case, negative_controls
@@ -21,6 +20,7 @@ from sim_validate.engine.simulated_friction import forces_just_above
 from sim_validate.engine.stepping import Bench
 from sim_validate.settings import HoldProtocol
 from tests.marks import more
+from tests.sim_validate.engine.test_held_or_let_go import pose
 from tests.sim_validate.rigs import grasps, limiting_loads
 
 SAMPLE_S = 0.01

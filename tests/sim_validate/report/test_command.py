@@ -121,7 +121,7 @@ def test_doctor_says_what_there_is_and_what_to_do(monkeypatch, capsys):
     def none():
         raise clips.GraphicsError("egl: no such library")
 
-    monkeypatch.setattr("sim_validate.closure.command.available_graphics", none)
+    monkeypatch.setattr("sim_validate.doctor.available_graphics", none)
     assert main(["doctor", "--json"]) == Exit.GOOD
     shown = capsys.readouterr()
     document = json.loads(shown.out)
@@ -135,7 +135,7 @@ def test_doctor_says_what_there_is_and_what_to_do(monkeypatch, capsys):
 
 
 def test_doctor_names_what_failed(monkeypatch, capsys):
-    monkeypatch.setattr("sim_validate.closure.command.critical_friction", lambda _: 0.1)
+    monkeypatch.setattr("sim_validate.doctor.critical_friction", lambda _: 0.1)
     assert main(["doctor"]) == Exit.INTERNAL
     shown = capsys.readouterr()
     assert "FAILED critical friction" in " ".join(shown.out.split())

@@ -9,7 +9,7 @@ import grasp_core as gc
 import scenes
 import sim_validate as sv
 from scenes.mujoco_options import PhysicsSettings
-from sim_validate.engine.gate import ClosureCase
+from sim_validate.engine.closure_cases import ClosureCase
 from sim_validate.engine.known_cases import checked, measured, untouching
 from sim_validate.engine.setup import Setup
 from sim_validate.engine.stepping import Bench

@@ -11,7 +11,7 @@ import sim_validate as sv
 from scenes.mujoco.held_scene import gravity_of
 from scenes.settings import HeldSettings
 from sim_validate.engine.known_cases import measured
-from sim_validate.execution.gate import HeldCase, cases_of
+from sim_validate.execution.held_cases import HeldCase, cases_of
 
 USUAL, STIFF, SOFT = (0.3, 2000.0, 0.07), (0.05, 10_000.0, 0.02), (2.0, 500.0, 0.2)
 """Mass of the object [kg], stiffness of the springs [N/m], radius of the object [m]."""

@@ -87,7 +87,7 @@ class ClosureCase:
     def of(
         cls, setup: Setup, friction: float = USUAL_FRICTION, radius_m: float = USUAL_RADIUS_M
     ) -> Self:
-        """Leave out of some settings what has no part in known cases."""
+        """Make the case for some settings, without those that known cases do not use."""
         fingers = replace(setup.fingers, fingertip_radius_m=None, approach=None)
         surface = setup.surface or "object"  # as on the known cases
         plain = replace(setup, fingers=fingers, surface=surface, threads=1, timeout_s=math.inf)

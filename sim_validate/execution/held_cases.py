@@ -79,7 +79,7 @@ LIGHT_LOAD = 0.6
 """Part of the load of slip that is put on the box where it must not slip."""
 SLOW_RISE = 30.0
 """Duration T of a slow rise, in reciprocal natural frequencies. Its third derivative is at most
-60 / T^3, so the box rings by at most 60 / SLOW^3 of its deflection afterwards, 0.2 %."""
+60 / T^3, so the box rings by at most 60 / SLOW_RISE^3 of its deflection afterwards, 0.2 %."""
 SQUEEZE_SETTLE_S = 0.02
 """Time after the squeeze in which it settles; it grows so slowly that little is left to settle."""
 SHORTEST_RISE_S = 0.15
