@@ -86,18 +86,15 @@ class Staging:
         """Look up how a unit ended: with its object and split, or with a reason for no rows."""
         return UnitRecord.read(self.of(unit) / UnitRecord.FILE)
 
-    def not_done(self, units: Sequence[WorkUnit]) -> list[WorkUnit]:
-        """List the units that no earlier, interrupted build has finished, and remove their rests.
-
-        Their files, if there are any, are damaged.
-        """
+    def unfinished(self, units: Sequence[WorkUnit]) -> list[WorkUnit]:
+        """List the units that no earlier build has finished, and remove damaged rests of them."""
         self.folder.mkdir(exist_ok=True)
-        left = [unit for unit in units if not self.done(unit)]
-        for unit in left:
+        found = [unit for unit in units if not self.is_finished(unit)]
+        for unit in found:
             shutil.rmtree(self.of(unit), ignore_errors=True)
-        return left
+        return found
 
-    def done(self, unit: WorkUnit) -> bool:
+    def is_finished(self, unit: WorkUnit) -> bool:
         """Tell whether a unit is finished or quarantined, and all its files are as written."""
         try:
             return not any(each.fault(self.of(unit)) for each in self.record(unit).files)
@@ -119,8 +116,8 @@ class Staging:
                 record = UnitRecord(unit.object, unit.friction, kept, **more)
                 _kept(made / record.FILE, record.text().encode())
         except (OSError, InputError):
-            if not self.done(unit):  # otherwise another attempt was faster and wrote the same rows
-                raise
+            if not self.is_finished(unit):
+                raise  # otherwise another attempt was faster and wrote the same rows
 
 
 def _kept(path: Path, data: bytes) -> Path:

@@ -77,10 +77,10 @@ def _write_given(folder: Path, units: Sequence[WorkUnit]) -> list[Path]:
     return [write_text(folder / GIVEN_CONTACTS, given_text(in_order))] if given else []
 
 
-def close(folder: Path, config: DatasetConfig, manifest: Manifest) -> None:
+def write_card_and_manifest(folder: Path, config: DatasetConfig, rows: Manifest) -> None:
     """Write the README.md of a dataset, and then the manifest, which marks it as finished."""
-    card = write_text(folder / CARD, card_text(config, manifest))
-    write_manifest(folder, replace(manifest, files=(*manifest.files, listed(folder, card))))
+    card = write_text(folder / CARD, card_text(config, rows))
+    write_manifest(folder, replace(rows, files=(*rows.files, listed(folder, card))))
 
 
 def _sorted_out(
