@@ -58,11 +58,11 @@ from sim_validate.datasets.learning import (
     trial_cells,
 )
 from sim_validate.datasets.making_rows import PLANNED_KIND, made_of
-from sim_validate.datasets.manifest import read_left_out
 from sim_validate.datasets.open_dataset import CONFIG, Dataset, select
 from sim_validate.datasets.parquet import RowCells, agrees, pyarrow
+from sim_validate.datasets.quarantine import TWIN, read_quarantine
 from sim_validate.datasets.work_units import WorkUnit, provenance
-from sim_validate.datasets.writing import GIVEN_CONTACTS, TWIN
+from sim_validate.datasets.writing import GIVEN_CONTACTS
 from sim_validate.engine.held_or_let_go import Outcome
 from sim_validate.execution.execute import tip_radius
 from sim_validate.execution.verdict import ExecutionTrial, may_slip
@@ -121,7 +121,7 @@ def _manifest_faults(dataset: Dataset) -> Iterator[str]:
         yield f"{CONFIG}: the file is not the configuration that the manifest names"
     if manifest.groups != config.groups:
         yield f"{MANIFEST}: `groups` is {manifest.groups}, unlike {CONFIG}"
-    lines = len(read_left_out(dataset.folder / QUARANTINE))
+    lines = len(read_quarantine(dataset.folder / QUARANTINE))
     if lines != manifest.quarantined:
         yield (
             f"{QUARANTINE}: the file has {lines} lines, but the manifest says "
@@ -154,16 +154,16 @@ class _Redoing:
         same = (dict(provenance()), arithmetic())
         self._exact = (manifest.versions, manifest.arithmetic) == same
         self._given = read_given(dataset.folder / GIVEN_CONTACTS) if self._config.contacts else ()
-        self._left_out: dict[tuple[str, float], set[str]] = {}
+        self._quarantined: dict[tuple[str, float], set[str]] = {}
         """Given grasps without rows, by source and friction; none where grasps are planned."""
-        for each in read_left_out(dataset.folder / QUARANTINE):
+        for each in read_quarantine(dataset.folder / QUARANTINE):
             if not each.reason.startswith(TWIN):
-                gone = self._left_out.setdefault((each.source_sha256, each.friction), set())
+                gone = self._quarantined.setdefault((each.source_sha256, each.friction), set())
                 gone.update(each.given)
 
     def frictions(self, row: ObjectRow) -> list[float]:
         """List the frictions at which an object has rows, perhaps without a grasp."""
-        return [f for f in self._config.frictions if not self._all_left_out(row, f)]
+        return [f for f in self._config.frictions if not self._all_quarantined(row, f)]
 
     def faults(
         self, row: ObjectRow, rows: DatasetRows, chosen: Set[tuple[str, float]]
@@ -172,20 +172,20 @@ class _Redoing:
         for friction in self._config.frictions:
             stored = rows.of_unit(row, friction)
             where = f"{row.source_name} at friction {friction}"
-            if self._all_left_out(row, friction):
+            if self._all_quarantined(row, friction):
                 if stored.grasps:
                     yield f"{where}: {QUARANTINE} lists this object as left out, but it has rows"
             elif (row.object_id, friction) in chosen:
                 found = islice(self._unit_faults(row, friction, stored), MOST_UNIT_FAULTS)
                 yield from (f"{where}: {fault}" for fault in found)
 
-    def _all_left_out(self, row: ObjectRow, friction: float) -> bool:
-        gone = self._left_out.get((row.source_sha256, friction))
+    def _all_quarantined(self, row: ObjectRow, friction: float) -> bool:
+        gone = self._quarantined.get((row.source_sha256, friction))
         return gone is not None and len(gone) == len(self._given)
 
     def _unit_faults(self, row: ObjectRow, friction: float, stored: DatasetRows) -> Iterator[str]:
         name, source = row.source_name, row.source_sha256
-        gone = self._left_out.get((source, friction), set())
+        gone = self._quarantined.get((source, friction), set())
         given = tuple(each for each in self._given if each.id not in gone)
         try:
             body = self._dataset.body(row.object_id, name)

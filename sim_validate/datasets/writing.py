@@ -19,22 +19,14 @@ from sim_validate.datasets.card import CARD, card_text
 from sim_validate.datasets.columns import dataset_tables
 from sim_validate.datasets.config import SPLITS, DatasetConfig
 from sim_validate.datasets.given_grasps import given_text
-from sim_validate.datasets.manifest import (
-    LeftOut,
-    Listed,
-    Manifest,
-    left_out_text,
-    listed,
-    write_manifest,
-)
+from sim_validate.datasets.manifest import Listed, Manifest, listed, write_manifest
 from sim_validate.datasets.open_dataset import CONFIG
 from sim_validate.datasets.parquet import joined, write_files
+from sim_validate.datasets.quarantine import TWIN, QuarantinedUnit, quarantine_text
 from sim_validate.datasets.resuming import OTHER_FILES, Staging, UnitRecord
 from sim_validate.datasets.work_units import WorkUnit, provenance, units_sha256
 
 DATA = "data"
-TWIN = "the same object as"
-"""First words of the reason why an object with the same mesh as another has no rows."""
 GIVEN_CONTACTS = "contacts.json"
 """Name of the file with the given contacts, if there are any; its normals point into the object."""
 EXTRAS = ("meshes", "scenes")
@@ -55,7 +47,7 @@ def write_rows(
         shutil.copytree(staging.of(unit) / OTHER_FILES, folder, dirs_exist_ok=True)
     others = [
         folder / CONFIG,
-        write_text(folder / QUARANTINE, left_out_text(quarantined)),
+        write_text(folder / QUARANTINE, quarantine_text(quarantined)),
         *_write_given(folder, units),
         *(path for name in EXTRAS for path in sorted((folder / name).glob("*"))),
     ]
@@ -85,9 +77,9 @@ def write_card_and_manifest(folder: Path, config: DatasetConfig, rows: Manifest)
 
 def _sorted_out(
     units: Sequence[WorkUnit], staging: Staging
-) -> tuple[list[Finished], list[LeftOut]]:
+) -> tuple[list[Finished], list[QuarantinedUnit]]:
     """List units with rows of their own, sorted by object, and the reasons why others have none."""
-    good, quarantined = list[Finished](), list[LeftOut]()
+    good, quarantined = list[Finished](), list[QuarantinedUnit]()
     first: dict[tuple[str | None, float], WorkUnit] = {}
     for unit in sorted(units, key=lambda each: (each.label, each.source_sha256, each.friction)):
         record = staging.record(unit)
@@ -99,7 +91,9 @@ def _sorted_out(
                 continue
             reason = f"{TWIN} {other.label}"
         given = tuple(each.id for each in unit.given)
-        quarantined.append(LeftOut(unit.label, unit.source_sha256, unit.friction, given, reason))
+        quarantined.append(
+            QuarantinedUnit(unit.label, unit.source_sha256, unit.friction, given, reason)
+        )
     return sorted(good, key=lambda each: (str(each[1].object_id), each[0].friction)), quarantined
 
 

@@ -127,8 +127,8 @@ def test_a_fault_of_ours_with_one_object_does_not_stop_the_others(tmp_path, monk
     monkeypatch.setattr(workers, "made_of", faulty)
     built = build(config, tmp_path / "ds", Here(), silent)
     assert (built.manifest.quarantined, built.manifest.rows["objects"]) == (1, 1)
-    left_out = (tmp_path / "ds" / "quarantine.jsonl").read_text()
-    assert "internal error: ZeroDivisionError: a bug" in left_out
+    quarantine = (tmp_path / "ds" / "quarantine.jsonl").read_text()
+    assert "internal error: ZeroDivisionError: a bug" in quarantine
 
 
 @pytest.mark.slow
