@@ -6,30 +6,21 @@ from pathlib import Path
 from typing import NamedTuple
 
 from grasp_core.errors import InputError
-from grasp_core.files.file_kinds import MANIFEST, QUARANTINE
+from grasp_core.files.file_kinds import MANIFEST
 from grasp_core.files.text_files import read_text, write_text
-from sim_validate.datasets.card import CARD
 from sim_validate.datasets.computing import Engine, compute_all
 from sim_validate.datasets.config import DatasetConfig, config_to_toml, settings_text
+from sim_validate.datasets.layout import CONFIG, OWN_FILES, STAGING_FOLDER
 from sim_validate.datasets.manifest import Manifest, path_inside, read_manifest
-from sim_validate.datasets.open_dataset import CONFIG
 from sim_validate.datasets.parquet import pyarrow
 from sim_validate.datasets.resuming import Staging
 from sim_validate.datasets.work_units import WorkUnit, units_of, units_sha256
-from sim_validate.datasets.writing import (
-    DATA,
-    EXTRAS,
-    GIVEN_CONTACTS,
-    write_card_and_manifest,
-    write_rows,
-)
+from sim_validate.datasets.writing import write_card_and_manifest, write_rows
 from sim_validate.engine.gate import ClosureCase
 from sim_validate.engine.known_cases import checked
 from sim_validate.engine.setup import Setup
 from sim_validate.files.locks import entries
 from sim_validate.files.output_folders import alone_in
-
-OWN_FILES = ("staging", DATA, *EXTRAS, GIVEN_CONTACTS, CONFIG, QUARANTINE, CARD, MANIFEST)
 
 
 class Built(NamedTuple):
@@ -53,7 +44,7 @@ def build(
     _refuse_sources_inside(units, config, folder)
     with alone_in(folder):
         _refuse_others(folder, config)
-        staging, unfinished = Staging(folder.resolve() / "staging"), list[WorkUnit]()
+        staging, unfinished = Staging(folder.resolve() / STAGING_FOLDER), list[WorkUnit]()
         if not (folder / MANIFEST).is_file():
             write_text(folder / CONFIG, config_to_toml(config))
             unfinished = staging.unfinished(units)  # an interrupted build is resumed with these

@@ -30,6 +30,7 @@ from sim_validate.datasets.columns import (
 )
 from sim_validate.datasets.config import SPLITS, SplitName, id_beginning
 from sim_validate.datasets.given_grasps import GraspToJudge
+from sim_validate.datasets.layout import SCENE_FOLDER
 from sim_validate.datasets.open_dataset import mesh_path, mesh_text
 from sim_validate.datasets.parquet import RowCells
 from sim_validate.datasets.work_units import WorkUnit
@@ -187,7 +188,7 @@ class Making:
         asked, seed = config.asked, config.seed
         verdict = learning.validated_with(body, grasp, friction, self.agenda, asked.synthetic)
         if config.scenes and verdict.scene is not None:
-            self.files[f"scenes/{name}.xml"] = verdict.scene.xml
+            self.files[f"{SCENE_FOLDER}/{name}.xml"] = verdict.scene.xml
         executed = learning.executed_by(config, body, grasp.contacts, friction, grasp.id)
         self._add(_Tried(body, grasp.contacts, grasp, verdict, executed), **cells)
         varied = chain(

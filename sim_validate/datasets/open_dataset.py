@@ -37,12 +37,11 @@ from sim_validate.datasets.config import (
     Name,
     config_from_toml,
 )
+from sim_validate.datasets.layout import CONFIG, MESH_FOLDER
 from sim_validate.datasets.manifest import Manifest, path_inside, read_manifest
 from sim_validate.datasets.parquet import Columns, each_batch, read_columns
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.planning.asked_objects import NAMES_LISTED, some
-
-CONFIG = "config.toml"
 
 
 @dataclass(frozen=True)
@@ -172,7 +171,6 @@ def load_dataset(folder: str | Path, split: str | None = None) -> dict[Name, Col
     return {name: read_columns(chosen.paths(name), name, tables) for name in tables}
 
 
-FOLDER = "meshes"
 SURFACE_LINE = "# surface "
 """Beginning of the first line, a comment that says what is known of the triangles."""
 
@@ -190,7 +188,7 @@ def mesh_text(body: Polyhedron) -> str:
 
 def mesh_path(folder: Path, object_id: str) -> Path:
     """Return the path of an object's mesh in a dataset."""
-    return path_inside(folder, f"{FOLDER}/{object_id}.obj")
+    return path_inside(folder, f"{MESH_FOLDER}/{object_id}.obj")
 
 
 def recorded_in_dataset(folder: Path, wanted: WantedTrial) -> Recorded:

@@ -50,6 +50,7 @@ from sim_validate.datasets.columns import (
 )
 from sim_validate.datasets.config import KEYS, REFERENCES, SPLITS, TABLE_NAMES, Name
 from sim_validate.datasets.given_grasps import read_given
+from sim_validate.datasets.layout import CONFIG, GIVEN_CONTACTS, STAGING_FOLDER
 from sim_validate.datasets.learning import (
     VARIED_RATIOS,
     contact_cells,
@@ -58,11 +59,10 @@ from sim_validate.datasets.learning import (
     trial_cells,
 )
 from sim_validate.datasets.making_rows import PLANNED_KIND, made_of
-from sim_validate.datasets.open_dataset import CONFIG, Dataset, select
+from sim_validate.datasets.open_dataset import Dataset, select
 from sim_validate.datasets.parquet import RowCells, agrees, pyarrow
 from sim_validate.datasets.quarantine import TWIN, read_quarantine
 from sim_validate.datasets.work_units import WorkUnit, provenance
-from sim_validate.datasets.writing import GIVEN_CONTACTS
 from sim_validate.engine.held_or_let_go import Outcome
 from sim_validate.execution.execute import tip_radius
 from sim_validate.execution.verdict import ExecutionTrial, may_slip
@@ -108,7 +108,7 @@ def _file_faults(dataset: Dataset) -> Iterator[str]:
     # staged files no longer matter
     yield from (
         f"{path}: this file is not listed in the manifest"
-        for path in sorted(more) if not path.startswith("staging/")
+        for path in sorted(more) if not path.startswith(f"{STAGING_FOLDER}/")
     )  # fmt: skip
     for each in files:
         if fault := each.fault(folder):

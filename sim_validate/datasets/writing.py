@@ -15,22 +15,16 @@ from typing import TypeAlias
 from grasp_core.files.file_kinds import QUARANTINE
 from grasp_core.files.text_files import write_text
 from grasp_core.provenance import arithmetic
-from sim_validate.datasets.card import CARD, card_text
+from sim_validate.datasets.card import card_text
 from sim_validate.datasets.columns import dataset_tables
 from sim_validate.datasets.config import SPLITS, DatasetConfig
 from sim_validate.datasets.given_grasps import given_text
+from sim_validate.datasets.layout import CARD, CONFIG, DATA, FILE_FOLDERS, GIVEN_CONTACTS
 from sim_validate.datasets.manifest import Listed, Manifest, listed, write_manifest
-from sim_validate.datasets.open_dataset import CONFIG
 from sim_validate.datasets.parquet import joined, write_files
 from sim_validate.datasets.quarantine import TWIN, QuarantinedUnit, quarantine_text
 from sim_validate.datasets.resuming import OTHER_FILES, Staging, UnitRecord
 from sim_validate.datasets.work_units import WorkUnit, provenance, units_sha256
-
-DATA = "data"
-GIVEN_CONTACTS = "contacts.json"
-"""Name of the file with the given contacts, if there are any; its normals point into the object."""
-EXTRAS = ("meshes", "scenes")
-
 
 Finished: TypeAlias = tuple[WorkUnit, UnitRecord]
 
@@ -39,7 +33,7 @@ def write_rows(
     folder: Path, config: DatasetConfig, units: Sequence[WorkUnit], staging: Staging
 ) -> Manifest:  # fmt: skip
     """Write the rows and files of all units, and list what is there."""
-    for name in (DATA, *EXTRAS):
+    for name in (DATA, *FILE_FOLDERS):
         shutil.rmtree(folder / name, ignore_errors=True)
     good, quarantined = _sorted_out(units, staging)
     tables = _write_tables(config, good, staging, folder)
@@ -49,7 +43,7 @@ def write_rows(
         folder / CONFIG,
         write_text(folder / QUARANTINE, quarantine_text(quarantined)),
         *_write_given(folder, units),
-        *(path for name in EXTRAS for path in sorted((folder / name).glob("*"))),
+        *(path for name in FILE_FOLDERS for path in sorted((folder / name).glob("*"))),
     ]
     return Manifest(
         config_sha256=config.sha256,
