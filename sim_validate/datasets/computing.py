@@ -25,7 +25,7 @@ from typing import TypeAlias
 from grasp_core.errors import GraspError
 from grasp_core.processes import Processes
 from sim_validate.datasets.clusters import Cluster
-from sim_validate.datasets.making_rows import made_of
+from sim_validate.datasets.making_rows import compute_rows
 from sim_validate.datasets.resuming import Staging
 from sim_validate.datasets.work_units import WorkerError, WorkUnit, body_of, provenance
 from sim_validate.processes.interrupts import check_interrupted
@@ -42,7 +42,7 @@ ComputeUnit: TypeAlias = Callable[[WorkUnit, Staging], None]
 def compute_unit(unit: WorkUnit, staging: Staging) -> None:
     """Compute the rows of a unit and keep them, or the reason why there are none."""
     try:
-        staging.write(unit, made_of(unit, body_of(unit)))
+        staging.write(unit, compute_rows(unit, body_of(unit)))
     except WorkerError:
         raise
     except GraspError as error:

@@ -19,7 +19,7 @@ from grasp_core.files.records import RecordFile
 from grasp_core.messages import FieldError, shown
 from sim_validate.datasets.columns import dataset_tables
 from sim_validate.datasets.config import Name, SplitName
-from sim_validate.datasets.making_rows import Making
+from sim_validate.datasets.making_rows import UnitRows
 from sim_validate.datasets.manifest import Listed, listed
 from sim_validate.datasets.parquet import parquet_bytes
 from sim_validate.datasets.work_units import WorkUnit
@@ -67,15 +67,15 @@ class Staging:
         """Remove the whole staging folder, once a finished dataset holds its contents."""
         shutil.rmtree(self.folder, ignore_errors=True)
 
-    def write(self, unit: WorkUnit, made: Making) -> None:
+    def write(self, unit: WorkUnit, made: UnitRows) -> None:
         """Keep the rows and files of a finished unit."""
-        kinds = dataset_tables(unit.config.groups)
+        kinds, rows = dataset_tables(unit.config.groups), made.rows
         tables = {
-            f"{name}.parquet": parquet_bytes(name, made.rows.cells(name, columns), kinds)
+            f"{name}.parquet": parquet_bytes(name, rows.cells(name, columns), kinds)
             for name, columns in kinds.items()
         }
         others = {f"{OTHER_FILES}/{path}": text.encode() for path, text in made.files.items()}
-        (row,) = made.rows.objects
+        (row,) = rows.objects
         self._put(unit, {**tables, **others}, object_id=row.object_id, split=row.split)
 
     def quarantine(self, unit: WorkUnit, reason: str) -> None:

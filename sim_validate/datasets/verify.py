@@ -58,7 +58,7 @@ from sim_validate.datasets.learning import (
     ratio_of,
     trial_cells,
 )
-from sim_validate.datasets.making_rows import PLANNED_KIND, made_of
+from sim_validate.datasets.making_rows import PLANNED_KIND, compute_rows
 from sim_validate.datasets.open_dataset import Dataset, select
 from sim_validate.datasets.parquet import RowCells, agrees, pyarrow
 from sim_validate.datasets.quarantine import TWIN, read_quarantine
@@ -189,7 +189,7 @@ class _Redoing:
         given = tuple(each for each in self._given if each.id not in gone)
         try:
             body = self._dataset.body(row.object_id, name)
-            made = made_of(WorkUnit(name, None, source, friction, self._config, given), body)
+            made = compute_rows(WorkUnit(name, None, source, friction, self._config, given), body)
         except GraspError as error:
             yield f"the grasps cannot be computed again ({error})"
             return

@@ -117,14 +117,14 @@ def test_a_worker_that_does_not_see_a_mesh_ends_the_run(tmp_path):
 
 def test_a_fault_of_ours_with_one_object_does_not_stop_the_others(tmp_path, monkeypatch):
     config = dataclasses.replace(CONFIG, objects=("tetrahedron", "wedge"))
-    plain = workers.made_of
+    plain = workers.compute_rows
 
     def faulty(unit, body):
         if unit.object == "wedge":
             raise ZeroDivisionError("a bug")
         return plain(unit, body)
 
-    monkeypatch.setattr(workers, "made_of", faulty)
+    monkeypatch.setattr(workers, "compute_rows", faulty)
     built = build(config, tmp_path / "ds", Here(), silent)
     assert (built.manifest.quarantined, built.manifest.rows["objects"]) == (1, 1)
     quarantine = (tmp_path / "ds" / "quarantine.jsonl").read_text()
