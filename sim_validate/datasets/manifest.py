@@ -23,7 +23,7 @@ from grasp_core.files.records import RecordFile
 from grasp_core.files.text_files import write_text
 from grasp_core.messages import FieldError
 from sim_validate.datasets.columns import dataset_tables, groups_asked
-from sim_validate.datasets.config import Name, SplitName
+from sim_validate.datasets.config import SplitName, TableName
 from sim_validate.datasets.parquet import Tables
 
 Size = Annotated[int, Interval(ge=0)]
@@ -37,7 +37,7 @@ class Listed(Declared):
     """Path of the file in the dataset's folder."""
     bytes: Size
     sha256: str
-    table: Name | None = None
+    table: TableName | None = None
     """Table that the file is a part of; None for other files."""
     split: SplitName | None = None
     """Split that the file's rows belong to; None for other files."""
@@ -101,13 +101,13 @@ class Manifest(RecordFile):
         """Number of rows of each table."""
         return {name: self.count(name) for name in self.tables}
 
-    def of_table(self, name: Name, split: str | None = None) -> tuple[Listed, ...]:
+    def of_table(self, name: TableName, split: str | None = None) -> tuple[Listed, ...]:
         """List the files of a table, in one split or in all of them."""
         return tuple(
             each for each in self.files if each.table == name and split in (None, each.split)
         )
 
-    def count(self, name: Name, split: str | None = None) -> int:
+    def count(self, name: TableName, split: str | None = None) -> int:
         """Count the rows of a table, in one split or in all of them."""
         return sum(each.rows or 0 for each in self.of_table(name, split))
 

@@ -18,7 +18,7 @@ from grasp_core.files.file_kinds import UNIT
 from grasp_core.files.records import RecordFile
 from grasp_core.messages import FieldError, shown
 from sim_validate.datasets.columns import dataset_tables
-from sim_validate.datasets.config import Name, SplitName
+from sim_validate.datasets.config import SplitName, TableName
 from sim_validate.datasets.making_rows import UnitRows
 from sim_validate.datasets.manifest import Listed, listed
 from sim_validate.datasets.parquet import parquet_bytes
@@ -101,7 +101,7 @@ class Staging:
         except (OSError, InputError):
             return False
 
-    def table(self, unit: WorkUnit, name: Name) -> Path:
+    def table(self, unit: WorkUnit, name: TableName) -> Path:
         """Return the path of a finished unit's rows in one of the tables."""
         return self.of(unit) / f"{name}.parquet"
 

@@ -48,7 +48,7 @@ from sim_validate.datasets.columns import (
     GraspRow,
     ObjectRow,
 )
-from sim_validate.datasets.config import KEYS, REFERENCES, SPLITS, TABLE_NAMES, Name
+from sim_validate.datasets.config import KEYS, REFERENCES, SPLITS, TABLE_NAMES, TableName
 from sim_validate.datasets.given_grasps import read_given
 from sim_validate.datasets.layout import CONFIG, GIVEN_CONTACTS, STAGING_FOLDER
 from sim_validate.datasets.learning import (
@@ -215,7 +215,9 @@ def drawn(
     return sorted(units, key=place)[: math.ceil(share * len(units))]
 
 
-def _differences(name: Name, stored: Sequence[RowCells], made: Sequence[RowCells]) -> Iterator[str]:
+def _differences(
+    name: TableName, stored: Sequence[RowCells], made: Sequence[RowCells]
+) -> Iterator[str]:
     before = {tuple(row[key] for key in KEYS[name]): row for row in stored}
     after = {tuple(row[key] for key in KEYS[name]): row for row in made}
     yield from (
@@ -267,7 +269,7 @@ object's radius. Planar faces are as flat as six digits show. Negative controls 
 the planes of patches, from which a curved surface departs."""
 RATIO_TOLERANCE = 1e-3
 """Share by which a ratio may leave its band: frictions and masses are rounded to four digits."""
-NAMING_COLUMNS: Mapping[tuple[Name, str], tuple[Name, str]] = {
+NAMING_COLUMNS: Mapping[tuple[TableName, str], tuple[TableName, str]] = {
     **REFERENCES, ("grasps", "control_of"): ("grasps", "grasp_id"),
 }  # fmt: skip
 LABELS = {"grasp": PLANNED_KIND, FROM_TOOL: FROM_TOOL}
