@@ -135,10 +135,8 @@ def test_a_fault_of_ours_with_one_object_does_not_stop_the_others(tmp_path, monk
 def test_a_process_that_never_ends_is_ended(staging):
     with local_processes(1) as engine:
         for never in (sleep, burn):
-            failed = engine.submit(compute_in_worker, task(staging, never, 0.5)).exception(
-                HANGING_S
-            )
-            assert failed is not None
+            ended = engine.submit(compute_in_worker, task(staging, never, 0.5))
+            assert ended.exception(HANGING_S) is not None
         given = task(staging, compute_unit)
         engine.submit(compute_in_worker, given).result()
     assert staging.of(given.unit).is_dir()
