@@ -6,24 +6,21 @@ from pathlib import Path
 from typing import NamedTuple
 
 from grasp_core.errors import InputError
-from grasp_core.files.file_kinds import MANIFEST, QUARANTINE
+from grasp_core.files.file_kinds import MANIFEST
 from grasp_core.files.text_files import read_text, write_text
-from sim_validate.datasets.card import CARD
 from sim_validate.datasets.computing import Engine, compute_all
 from sim_validate.datasets.config import DatasetConfig, config_to_toml, settings_text
+from sim_validate.datasets.layout import CONFIG, OWN_FILES, STAGING_FOLDER
 from sim_validate.datasets.manifest import Manifest, path_inside, read_manifest
-from sim_validate.datasets.open_dataset import CONFIG
 from sim_validate.datasets.parquet import pyarrow
 from sim_validate.datasets.resuming import Staging
 from sim_validate.datasets.work_units import WorkUnit, units_of, units_sha256
-from sim_validate.datasets.writing import DATA, EXTRAS, GIVEN_CONTACTS, close, write_rows
+from sim_validate.datasets.writing import write_card_and_manifest, write_rows
 from sim_validate.engine.closure_cases import ClosureCase
 from sim_validate.engine.known_cases import checked
 from sim_validate.engine.setup import Setup
 from sim_validate.files.locks import entries
 from sim_validate.files.output_folders import alone_in
-
-OWN_FILES = ("staging", DATA, *EXTRAS, GIVEN_CONTACTS, CONFIG, QUARANTINE, CARD, MANIFEST)
 
 
 class Built(NamedTuple):
@@ -47,15 +44,18 @@ def build(
     _refuse_sources_inside(units, config, folder)
     with alone_in(folder):
         _refuse_others(folder, config)
-        staging, left = Staging(folder.resolve() / "staging"), list[WorkUnit]()
+        staging, unfinished = Staging(folder.resolve() / STAGING_FOLDER), list[WorkUnit]()
         if not (folder / MANIFEST).is_file():
             write_text(folder / CONFIG, config_to_toml(config))
-            left = staging.not_done(units)  # a build that was interrupted is resumed with these
-            _check_simulator(config, left)
-            compute_all(left, staging, engine, report, timeout_s)
-            close(folder, config, write_rows(folder, config, units, staging))
+            unfinished = staging.unfinished(units)  # an interrupted build is resumed with these
+            _check_simulator(config, unfinished)
+            compute_all(unfinished, staging, engine, report, timeout_s)
+            rows = write_rows(folder, config, units, staging)
+            write_card_and_manifest(folder, config, rows)
         staging.remove()
-        return Built(_finished(folder, units), len(left))
+        manifest = read_manifest(folder)
+        _check_manifest(manifest, folder, units)
+        return Built(manifest, len(unfinished))
 
 
 def _refuse_sources_inside(units: Sequence[WorkUnit], config: DatasetConfig, folder: Path) -> None:
@@ -98,8 +98,7 @@ def _check_simulator(config: DatasetConfig, units: Sequence[WorkUnit]) -> None:
         checked(ClosureCase.of(Setup(), friction))
 
 
-def _finished(folder: Path, units: Sequence[WorkUnit]) -> Manifest:
-    manifest = read_manifest(folder)
+def _check_manifest(manifest: Manifest, folder: Path, units: Sequence[WorkUnit]) -> None:
     if manifest.units_sha256 != units_sha256(units):
         raise InputError(
             f"{folder}: this dataset is finished, but its meshes, contacts or package versions "
@@ -112,4 +111,3 @@ def _finished(folder: Path, units: Sequence[WorkUnit]) -> Manifest:
                 f"{path}: this file of a finished dataset is missing or damaged (see `dataset "
                 "verify`); give another --out to make it again"
             )
-    return manifest

@@ -22,7 +22,6 @@ from sim_validate.datasets.config import (
 )
 from sim_validate.datasets.manifest import Manifest
 
-CARD = "README.md"
 HUB_SIZES = ("1K", "10K", "100K", "1M", "10M", "100M", "1B", "10B", "100B")
 """Powers of ten, from a thousand, as the Hugging Face Hub names sizes of datasets."""
 MARKDOWN_MARKS = frozenset("\\`*_[]<>|~&#!$@")

@@ -22,7 +22,7 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.given_contacts import seat
 from grasp_core.values import FINGERS, Contact
 from sim_validate.closure.verdict import Verdict
-from sim_validate.datasets.config import EXECUTED, TABLE_NAMES, Name, SplitName, id_beginning
+from sim_validate.datasets.config import EXECUTED, TABLE_NAMES, SplitName, TableName, id_beginning
 from sim_validate.datasets.parquet import (
     InGroup,
     Known,
@@ -344,7 +344,7 @@ class ExecutionRow(Declared):
     """Seed that a misplaced trial was drawn by; null for others."""
 
 
-ROW_CLASSES: Mapping[Name, type[Any]] = {
+ROW_CLASSES: Mapping[TableName, type[Any]] = {
     "objects": ObjectRow, "grasps": GraspRow, "trials": TrialRow, "executions": ExecutionRow,
 }  # fmt: skip
 
@@ -358,7 +358,7 @@ class DatasetRows:
     trials: tuple[TrialRow, ...] = ()
     executions: tuple[ExecutionRow, ...] = ()
 
-    def of(self, name: Name) -> tuple[Any, ...]:
+    def of(self, name: TableName) -> tuple[Any, ...]:
         """Return the rows of a table."""
         return getattr(self, name)
 
@@ -371,7 +371,7 @@ class DatasetRows:
         }  # fmt: skip
         return DatasetRows((row,), **own)
 
-    def cells(self, name: Name, columns: tuple[TableColumn, ...]) -> list[dict[str, Any]]:
+    def cells(self, name: TableName, columns: tuple[TableColumn, ...]) -> list[dict[str, Any]]:
         """Return the cells of the rows of a table."""
         return [cells_of(row, columns) for row in self.of(name)]
 

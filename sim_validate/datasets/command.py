@@ -15,7 +15,6 @@ from sim_validate.commands.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.commands.exit_codes import Exit
 from sim_validate.datasets import flags as dataset_flags
 from sim_validate.datasets.build import build
-from sim_validate.datasets.card import CARD
 from sim_validate.datasets.clusters import dask_workers, ray_workers
 from sim_validate.datasets.computing import Engine
 from sim_validate.datasets.config import (
@@ -25,7 +24,8 @@ from sim_validate.datasets.config import (
     PlannedContent,
     config_from_toml,
 )
-from sim_validate.datasets.open_dataset import CONFIG, splits_in_words
+from sim_validate.datasets.layout import CARD, CONFIG
+from sim_validate.datasets.open_dataset import splits_in_words
 from sim_validate.datasets.verify import verify
 
 

@@ -25,7 +25,7 @@ from typing import TypeAlias
 from grasp_core.errors import GraspError
 from grasp_core.processes import Processes
 from sim_validate.datasets.clusters import Cluster
-from sim_validate.datasets.making_rows import made_of
+from sim_validate.datasets.making_rows import compute_rows
 from sim_validate.datasets.resuming import Staging
 from sim_validate.datasets.work_units import WorkerError, WorkUnit, body_of, provenance
 from sim_validate.processes.interrupts import check_interrupted
@@ -36,13 +36,13 @@ UNITS_AHEAD = 3
 INTERRUPT_LOOK_S = 1.0
 
 
-DoUnit: TypeAlias = Callable[[WorkUnit, Staging], None]
+ComputeUnit: TypeAlias = Callable[[WorkUnit, Staging], None]
 
 
-def do_unit(unit: WorkUnit, staging: Staging) -> None:
+def compute_unit(unit: WorkUnit, staging: Staging) -> None:
     """Compute the rows of a unit and keep them, or the reason why there are none."""
     try:
-        staging.write(unit, made_of(unit, body_of(unit)))
+        staging.write(unit, compute_rows(unit, body_of(unit)))
     except WorkerError:
         raise
     except GraspError as error:
@@ -56,7 +56,7 @@ def do_unit(unit: WorkUnit, staging: Staging) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class UnitJob:
+class UnitTask:
     """A unit of work, with all that a worker process needs to compute it."""
 
     unit: WorkUnit
@@ -64,11 +64,11 @@ class UnitJob:
     provenance: Mapping[str, str]
     """Versions of packages, and the hash of the code, that the worker process must have, too."""
     timeout_s: float | None = None
-    """Time that the unit may take [s]; None where the process that runs the build computes it."""
-    work: DoUnit = do_unit
+    """Time that the unit may take [s]; None for no limit."""
+    compute: ComputeUnit = compute_unit
 
 
-def do_task(task: UnitJob) -> None:
+def compute_in_worker(task: UnitTask) -> None:
     """Compute a unit in a worker process, and keep its rows."""
     own = provenance()
     for name, wanted in task.provenance.items():
@@ -83,7 +83,7 @@ def do_task(task: UnitJob) -> None:
             "file system that all processes share"
         )
     with _ending_after(task.timeout_s):
-        task.work(task.unit, task.staging)
+        task.compute(task.unit, task.staging)
 
 
 @contextmanager
@@ -106,14 +106,14 @@ def compute_all(
     engine: Engine,
     report: Callable[[int, int], None],
     timeout_s: float | None = None,
-    work: DoUnit = do_unit,
+    compute: ComputeUnit = compute_unit,
 ) -> None:
     """Have all units computed; each one is kept or quarantined in the end.
 
     Takes `report` (finished, total).
     """
-    own, finished, again = dict(provenance()), 0, list[UnitJob]()
-    tasks = [UnitJob(unit, staging, own, timeout_s, work) for unit in units]
+    own, finished, again = dict(provenance()), 0, list[UnitTask]()
+    tasks = [UnitTask(unit, staging, own, timeout_s, compute) for unit in units]
     report(finished, len(units))
     for task, good in _ended(tasks, engine, UNITS_AHEAD * engine.workers):
         again += [] if good else [task]
@@ -130,20 +130,22 @@ def compute_all(
         report(finished, len(units))
 
 
-def _ended(tasks: Sequence[UnitJob], engine: Engine, ahead: int) -> Iterator[tuple[UnitJob, bool]]:
+def _ended(
+    tasks: Sequence[UnitTask], engine: Engine, ahead: int
+) -> Iterator[tuple[UnitTask, bool]]:
     """Yield each task when it has ended, with whether it is done or its worker process has died."""
-    waiting, under_way = deque(tasks), dict[Future[None], UnitJob]()
+    waiting, under_way = deque(tasks), dict[Future[None], UnitTask]()
     while waiting or under_way:
         while waiting and len(under_way) < ahead:
             task = waiting.popleft()
-            under_way[engine.submit(do_task, task)] = task
+            under_way[engine.submit(compute_in_worker, task)] = task
         for future in wait(under_way, timeout=INTERRUPT_LOOK_S, return_when=FIRST_COMPLETED).done:
             task = under_way.pop(future)
             yield task, _succeeded(future, task, engine)
         check_interrupted()
 
 
-def _succeeded(future: "Future[None]", task: UnitJob, engine: Engine) -> bool:
+def _succeeded(future: "Future[None]", task: UnitTask, engine: Engine) -> bool:
     error = future.exception()
     if error is None:
         if task.staging.of(task.unit).is_dir():

@@ -2,8 +2,6 @@
 
 Everything that decides a row is here. So the hash of the resolved text, together with the hashes of
 the meshes and the versions, identifies what a dataset can hold.
-
-The tables that a dataset has are named here as well, since flags need the names.
 """
 
 from collections import Counter
@@ -15,7 +13,7 @@ from typing import Annotated, Literal, TypeAlias, cast, get_args
 
 from annotated_types import Interval
 
-from grasp_core.allowed_values import MOST_COUNT, Count, Friction, RandomWrenches
+from grasp_core.allowed_values import Count, Friction, Number, RandomWrenches
 from grasp_core.declared import declared
 from grasp_core.errors import InputError, about
 from grasp_core.mesh_files.limits import FaceKind, FileLengths
@@ -24,20 +22,20 @@ from grasp_core.names import METHODS, ConeKind, Method
 from grasp_core.settings import Settings, as_table
 from sim_validate.settings import ExecutionSettings, LimitSearch
 
-Name: TypeAlias = Literal["objects", "grasps", "trials", "executions"]
-TABLE_NAMES: tuple[Name, ...] = get_args(Name)
+TableName: TypeAlias = Literal["objects", "grasps", "trials", "executions"]
+TABLE_NAMES: tuple[TableName, ...] = get_args(TableName)
 SplitName: TypeAlias = Literal["train", "validation", "test"]
 SPLITS: tuple[tuple[SplitName, float], ...] = (("test", 0.1), ("validation", 0.2), ("train", 1.0))
 """Upper ends of each split's share of hashes: an object is in the first split whose end is above
 its hash."""
 ID_DIGITS = 16
 """Number of digits of an object's hash in the names of its grasps."""
-KEYS: Mapping[Name, tuple[str, ...]] = {
+KEYS: Mapping[TableName, tuple[str, ...]] = {
     "objects": ("object_id",), "grasps": ("object_id", "grasp_id"), "trials": ("grasp_id", "trial"),
     "executions": ("grasp_id", "trial"),
 }  # fmt: skip
 """Columns by which the rows of a table are sorted; no two rows have the same values in them."""
-REFERENCES: Mapping[tuple[Name, str], tuple[Name, str]] = {
+REFERENCES: Mapping[tuple[TableName, str], tuple[TableName, str]] = {
     ("grasps", "object_id"): ("objects", "object_id"),
     ("trials", "grasp_id"): ("grasps", "grasp_id"),
     ("executions", "grasp_id"): ("grasps", "grasp_id"),
@@ -60,26 +58,26 @@ CONTROL_KINDS = 5
 """Number of kinds of synthetic negative controls that a grasp has at most."""
 CREDITS = ("title", "license", "creator", "url", "published")
 """Settings that only inform people; no row depends on them."""
-Varied = Annotated[int, Interval(ge=0, le=100)]
+RowsPerGrasp = Annotated[int, Interval(ge=0, le=100)]
 
 
 @declared
 class Learning(Settings):
     """What is added to the tables, and how many rows of each kind are made from a grasp."""
 
-    friction_below: Varied = 0
+    friction_below: RowsPerGrasp = 0
     """Rows per grasp with its contacts clearly below their critical friction."""
-    friction_near: Varied = 0
+    friction_near: RowsPerGrasp = 0
     """Rows per grasp within some percent of the critical friction, on either side."""
-    friction_above: Varied = 0
+    friction_above: RowsPerGrasp = 0
     """Rows per grasp clearly above the critical friction."""
-    moved_out: Varied = 0
+    moved_out: RowsPerGrasp = 0
     """Rows per grasp with contacts moved on their faces, each out of its region."""
-    mass_near: Varied = 0
+    mass_near: RowsPerGrasp = 0
     """Rows per grasp that is executed with a mass near the one at which it is predicted to fail."""
     figures: tuple[FigureGroup, ...] = ()
     """Groups of figures that each grasp has; docs/datasets.md says what each costs."""
-    seeds: tuple[Annotated[int, Interval(ge=0, le=MOST_COUNT)], ...] = ()
+    seeds: tuple[Number, ...] = ()
     """Seeds by which objects are misplaced once more in executions, besides the execution's own."""
     synthetic: Annotated[int, Interval(ge=0, le=CONTROL_KINDS)] = CONTROL_KINDS
     """Largest number of synthetic negative controls of each grasp, drawn from all that exist."""

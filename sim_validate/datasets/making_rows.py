@@ -30,6 +30,7 @@ from sim_validate.datasets.columns import (
 )
 from sim_validate.datasets.config import SPLITS, SplitName, id_beginning
 from sim_validate.datasets.given_grasps import GraspToJudge
+from sim_validate.datasets.layout import SCENE_FOLDER
 from sim_validate.datasets.open_dataset import mesh_path, mesh_text
 from sim_validate.datasets.parquet import RowCells
 from sim_validate.datasets.work_units import WorkUnit
@@ -105,18 +106,18 @@ class _Tried:
         }
 
 
-def made_of(unit: WorkUnit, body: Polyhedron) -> "Making":
+def compute_rows(unit: WorkUnit, body: Polyhedron) -> "UnitRows":
     """Plan the grasps of a unit or judge the given ones, simulate them, and make their rows."""
-    made = Making(unit, body)
+    made = UnitRows(unit, body)
     if unit.given:
-        made.judge()
+        made.add_given()
     else:
-        made.plan()
+        made.add_planned()
     return made
 
 
-class Making:
-    """The rows and files of a unit of work, before and after they are made."""
+class UnitRows:
+    """The rows and files of a unit of work, to which its grasps are added one by one."""
 
     def __init__(self, unit: WorkUnit, body: Polyhedron) -> None:
         self.unit, self.body, self.config = unit, body, unit.config
@@ -135,7 +136,7 @@ class Making:
         own = _object_row(self.body, self.unit)
         return DatasetRows((own,), tuple(self.grasps), tuple(self.trials), tuple(self.executions))
 
-    def plan(self) -> None:
+    def add_planned(self) -> None:
         """Plan the best grasps of each family separately, and simulate them."""
         config = self.config
         for family in config.families:
@@ -151,11 +152,11 @@ class Making:
                     "faces": grasp.faces, "region_radius_m": grasp.radius,
                 }  # fmt: skip
                 try:
-                    self._try(grasp, self.body, **cells)
+                    self._add_closed(grasp, self.body, **cells)
                 except OWN_FAULTS as error:
-                    self._note(grasp.contacts, error, cells)
+                    self._add_untried(grasp.contacts, error, cells)
 
-    def judge(self) -> None:
+    def add_given(self) -> None:
         """Judge the given grasps; a grasp that cannot be simulated gets a row with the reason."""
         for given in self.unit.given:
             cells: RowCells = {
@@ -163,48 +164,50 @@ class Making:
                 "label": FROM_TOOL, "kind": FROM_TOOL,
             }  # fmt: skip
             try:
-                self._judge(given, cells)
+                self._add_one_given(given, cells)
             except OWN_FAULTS as error:
-                self._note(tuple(map(Contact, given.points, given.normals)), error, cells)
+                self._add_untried(tuple(map(Contact, given.points, given.normals)), error, cells)
 
-    def _note(self, contacts: Sequence[Contact], error: Exception, cells: RowCells) -> None:
+    def _add_untried(self, contacts: Sequence[Contact], error: Exception, cells: RowCells) -> None:
         self.grasps.append(GraspRow(**self._about(contacts), **cells, note=str(error)))
 
-    def _judge(self, given: GraspToJudge, cells: RowCells) -> None:
+    def _add_one_given(self, given: GraspToJudge, cells: RowCells) -> None:
         """Try a given grasp; one that is not in force closure is a negative control."""
         at = seat(self.body, given.points, given.normals)
         proved = grasp_of(at, self.unit.friction, given.id)
         if isinstance(proved, Grasp):
-            self._try(proved, at.body, **cells, moved_m=at.moved_m, faces=self._faces(proved))
+            self._add_closed(
+                proved, at.body, **cells, moved_m=at.moved_m, faces=self._faces(proved)
+            )
         else:
             control = Control(FROM_TOOL, self.unit.friction, proved)
             verdict = try_control(at.body, control, self.agenda, Setup())
             tried = _Tried(at.body, at.contacts, proved, verdict)
-            self._add(tried, **cells, moved_m=at.moved_m)
+            self._add_row(tried, **cells, moved_m=at.moved_m)
 
-    def _try(self, grasp: Grasp, body: Polyhedron, **cells: Any) -> None:
+    def _add_closed(self, grasp: Grasp, body: Polyhedron, **cells: Any) -> None:
         config, friction, name = self.config, self.unit.friction, cells["grasp_id"]
         asked, seed = config.asked, config.seed
         verdict = learning.validated_with(body, grasp, friction, self.agenda, asked.synthetic)
         if config.scenes and verdict.scene is not None:
-            self.files[f"scenes/{name}.xml"] = verdict.scene.xml
+            self.files[f"{SCENE_FOLDER}/{name}.xml"] = verdict.scene.xml
         executed = learning.executed_by(config, body, grasp.contacts, friction, grasp.id)
-        self._add(_Tried(body, grasp.contacts, grasp, verdict, executed), **cells)
+        self._add_row(_Tried(body, grasp.contacts, grasp, verdict, executed), **cells)
         varied = chain(
             learning.variants(body, grasp, friction, asked, seed),
             learning.heavier(body, grasp, friction, executed, asked, seed),
         )
         for each in varied:
             try:
-                tried = self.varied(each, verdict)
+                tried = self._tried_variant(each, verdict)
             except InputError:  # fingertips find no room
                 continue
-            self._add(
+            self._add_row(
                 tried, **each.cells, grasp_id=f"{name}:{each.name}", name=each.name, label=VARIED,
                 made_from=name, faces=self._faces(each.proved),
             )  # fmt: skip
 
-    def varied(self, variant: learning.Variant, source: Verdict) -> _Tried:
+    def _tried_variant(self, variant: learning.Variant, source: Verdict) -> _Tried:
         """Simulate and execute a varied grasp; where only its mass is another, trials are kept."""
         at, friction, proved = variant.seated, variant.friction, variant.proved
         if variant.mass_kg is not None:
@@ -243,7 +246,7 @@ class Making:
     def _name(self, grasp: str) -> str:
         return id_beginning(self.body.content_sha256, self.unit.friction) + grasp
 
-    def _add(self, tried: _Tried, **cells: Any) -> None:
+    def _add_row(self, tried: _Tried, **cells: Any) -> None:
         body, verdict, proved = tried.body, tried.verdict, tried.proved
         cells = {**self._about(tried.contacts), **cells, **tried.cells}
         if isinstance(proved, Grasp):
@@ -260,7 +263,7 @@ class Making:
         self.executions += learning.execution_rows(row.grasp_id, tried.executed, self.config)
         for each in verdict.controls if closed else ():
             kind, proof = each.control.name, each.control.certificate
-            self._add(
+            self._add_row(
                 _Tried(body, each.control.contacts, proof, each), name=row.name, label=kind,
                 grasp_id=f"{row.grasp_id}:{kind}", kind=kind, control_of=row.grasp_id,
             )  # fmt: skip

@@ -1,4 +1,4 @@
-"""The manifest of a dataset, and the list of units of work that have no rows.
+"""The manifest of a dataset.
 
 The manifest names all files, and the versions that made them. A folder without one is no finished
 dataset, as it is written last. It does not say when or with how many processes the dataset was
@@ -6,8 +6,7 @@ made: equal configuration, meshes and versions give equal bytes.
 """
 
 import hashlib
-import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import field, replace
 from pathlib import Path, PurePosixPath
 from typing import Annotated
@@ -17,14 +16,14 @@ from pydantic import computed_field
 
 from grasp_core.allowed_values import Number
 from grasp_core.declared import Declared, declared
-from grasp_core.errors import InputError, about
-from grasp_core.files.file_kinds import MANIFEST, QUARANTINE
-from grasp_core.files.json_text import object_of, shown
-from grasp_core.files.records import RecordFile, from_record, record_of
-from grasp_core.files.text_files import read_text, write_text
+from grasp_core.errors import InputError
+from grasp_core.files.file_kinds import MANIFEST
+from grasp_core.files.json_text import shown
+from grasp_core.files.records import RecordFile
+from grasp_core.files.text_files import write_text
 from grasp_core.messages import FieldError
 from sim_validate.datasets.columns import dataset_tables, groups_asked
-from sim_validate.datasets.config import Name, SplitName
+from sim_validate.datasets.config import SplitName, TableName
 from sim_validate.datasets.parquet import Tables
 
 Size = Annotated[int, Interval(ge=0)]
@@ -38,7 +37,7 @@ class Listed(Declared):
     """Path of the file in the dataset's folder."""
     bytes: Size
     sha256: str
-    table: Name | None = None
+    table: TableName | None = None
     """Table that the file is a part of; None for other files."""
     split: SplitName | None = None
     """Split that the file's rows belong to; None for other files."""
@@ -77,7 +76,7 @@ class Manifest(RecordFile):
     units_sha256: str
     """Hash of the names of all units of work, which depend on everything that decides rows."""
     quarantined: Number
-    """Number of units of work that were left out."""
+    """Number of units of work that were quarantined."""
     files: tuple[Listed, ...]
     groups: Mapping[str, Number] = field(default_factory=dict[str, int])
     """Groups of columns that the dataset has on request, with their sizes."""
@@ -102,13 +101,13 @@ class Manifest(RecordFile):
         """Number of rows of each table."""
         return {name: self.count(name) for name in self.tables}
 
-    def of_table(self, name: Name, split: str | None = None) -> tuple[Listed, ...]:
+    def of_table(self, name: TableName, split: str | None = None) -> tuple[Listed, ...]:
         """List the files of a table, in one split or in all of them."""
         return tuple(
             each for each in self.files if each.table == name and split in (None, each.split)
         )
 
-    def count(self, name: Name, split: str | None = None) -> int:
+    def count(self, name: TableName, split: str | None = None) -> int:
         """Count the rows of a table, in one split or in all of them."""
         return sum(each.rows or 0 for each in self.of_table(name, split))
 
@@ -136,40 +135,6 @@ def read_manifest(folder: Path) -> Manifest:
             "dataset build` to the end"
         )
     return Manifest.read(path)
-
-
-@declared
-class LeftOut(Declared):
-    """A unit of work without rows, with the reason."""
-
-    object: str
-    source_sha256: str
-    friction: float
-    given: tuple[str, ...]
-    """Ids of the given grasps that have no rows, if the unit is about given grasps."""
-    reason: str
-
-
-def left_out_text(units: Iterable[LeftOut]) -> str:
-    """Write the text of `quarantine.jsonl`, one line per unit of work without rows."""
-    return "".join(json.dumps(record_of(each)) + "\n" for each in units)
-
-
-def read_left_out(path: Path) -> list[LeftOut]:
-    """Read `quarantine.jsonl`: the units of work that have no rows."""
-    text = read_text(path)
-    with about(path):
-        return left_out_from(text)
-
-
-def left_out_from(text: str) -> list[LeftOut]:
-    """Parse the text of `quarantine.jsonl`."""
-    found = list[LeftOut]()
-    lines = text.removesuffix("\n").split("\n") if text else []
-    for number, line in enumerate(lines, start=1):
-        with about(f"line {number}"):
-            found.append(from_record(LeftOut, object_of(line, f"line of {QUARANTINE}")))
-    return found
 
 
 LONGEST = 500

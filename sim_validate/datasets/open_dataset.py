@@ -34,15 +34,14 @@ from sim_validate.datasets.config import (
     KEYS,
     SPLITS,
     DatasetConfig,
-    Name,
+    TableName,
     config_from_toml,
 )
+from sim_validate.datasets.layout import CONFIG, MESH_FOLDER
 from sim_validate.datasets.manifest import Manifest, path_inside, read_manifest
 from sim_validate.datasets.parquet import Columns, each_batch, read_columns
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.planning.asked_objects import NAMES_LISTED, some
-
-CONFIG = "config.toml"
 
 
 @dataclass(frozen=True)
@@ -58,7 +57,7 @@ class Dataset:
         """Read the configuration of the dataset."""
         return config_from_toml(self.folder / CONFIG)
 
-    def paths(self, name: Name) -> list[Path]:
+    def paths(self, name: TableName) -> list[Path]:
         """List the files of a table, each checked to have the manifest's hash.
 
         Checksums of pages miss some bytes.
@@ -71,7 +70,7 @@ class Dataset:
 
     def rows(self, kind: type[Record], **cells: str | bool) -> Iterator[Record]:
         """Yield rows of a class, or those with some cells, without holding all in memory."""
-        name: Name = next(name for name, each in ROW_CLASSES.items() if each is kind)
+        name: TableName = next(name for name, each in ROW_CLASSES.items() if each is kind)
         for each in self.manifest.of_table(name, self.split):
             found = 0
             for batch in each_batch(
@@ -91,12 +90,12 @@ class Dataset:
         """Yield the rows of each object in turn."""
         streams = map(self._begun, self.manifest.tables)
         for _, same in groupby(merge(*streams, key=itemgetter(0)), key=itemgetter(0)):
-            rows: dict[Name, list[Any]] = {}
+            rows: dict[TableName, list[Any]] = {}
             for _, name, row in same:
                 rows.setdefault(name, []).append(row)
             yield DatasetRows(**{name: tuple(each) for name, each in rows.items()})
 
-    def _begun(self, name: Name) -> Iterator[tuple[str, Name, Any]]:
+    def _begun(self, name: TableName) -> Iterator[tuple[str, TableName, Any]]:
         """Yield rows with the part of their first key that all rows of an object share."""
         key = KEYS[name][0]
         for row in self.rows(ROW_CLASSES[name]):
@@ -142,7 +141,7 @@ def splits_in_words(manifest: Manifest) -> str:
     return f"{', '.join(counts)} objects"
 
 
-def load_dataset(folder: str | Path, split: str | None = None) -> dict[Name, Columns]:
+def load_dataset(folder: str | Path, split: str | None = None) -> dict[TableName, Columns]:
     """Read the tables of a dataset, each as a dictionary of its columns.
 
     Args:
@@ -172,7 +171,6 @@ def load_dataset(folder: str | Path, split: str | None = None) -> dict[Name, Col
     return {name: read_columns(chosen.paths(name), name, tables) for name in tables}
 
 
-FOLDER = "meshes"
 SURFACE_LINE = "# surface "
 """Beginning of the first line, a comment that says what is known of the triangles."""
 
@@ -190,7 +188,7 @@ def mesh_text(body: Polyhedron) -> str:
 
 def mesh_path(folder: Path, object_id: str) -> Path:
     """Return the path of an object's mesh in a dataset."""
-    return path_inside(folder, f"{FOLDER}/{object_id}.obj")
+    return path_inside(folder, f"{MESH_FOLDER}/{object_id}.obj")
 
 
 def recorded_in_dataset(folder: Path, wanted: WantedTrial) -> Recorded:

@@ -34,7 +34,7 @@ from grasp_core.figures import Figure, figures, meanings, unit_of
 from grasp_core.files.json_text import shown
 from grasp_core.files.records import entries, record_of
 from grasp_core.values import FINGERS
-from sim_validate.datasets.config import KEYS, Name
+from sim_validate.datasets.config import KEYS, TableName
 
 CellKind: TypeAlias = Literal["text", "bool", "int", "float"]
 RowCells: TypeAlias = Mapping[str, Any]
@@ -71,7 +71,7 @@ class TableColumn:
     """Shape of each cell; () for a plain value."""
 
 
-Tables: TypeAlias = Mapping[Name, tuple[TableColumn, ...]]
+Tables: TypeAlias = Mapping[TableName, tuple[TableColumn, ...]]
 Form: TypeAlias = tuple[CellKind, tuple[int, ...]]
 
 
@@ -203,7 +203,7 @@ def pyarrow() -> Any:
         ) from error
 
 
-def parquet_bytes(name: Name, rows: Sequence[RowCells], tables: Tables) -> bytes:
+def parquet_bytes(name: TableName, rows: Sequence[RowCells], tables: Tables) -> bytes:
     """Encode the cells of one table's rows as the bytes of a file, sorted by their keys."""
     arrow, held = pyarrow(), io.BytesIO()
     try:
@@ -214,7 +214,7 @@ def parquet_bytes(name: Name, rows: Sequence[RowCells], tables: Tables) -> bytes
     return held.getvalue()
 
 
-def _in_order(table: Any, name: Name) -> Any:
+def _in_order(table: Any, name: TableName) -> Any:
     keys = list(KEYS[name])
     if table.group_by(keys).aggregate([]).num_rows < table.num_rows:
         raise InputError(
@@ -224,27 +224,27 @@ def _in_order(table: Any, name: Name) -> Any:
     return table.sort_by([(key, "ascending") for key in keys])
 
 
-def each_batch(path: Path, name: Name, tables: Tables) -> Iterator[Any]:
+def each_batch(path: Path, name: TableName, tables: Tables) -> Iterator[Any]:
     """Yield the rows of a file as Arrow's record batches, without holding all of them in memory."""
     with _opened(path, name, tables) as file:
         yield from file.iter_batches(GROUP_ROWS)
 
 
-def joined(paths: Iterable[Path], name: Name, tables: Tables) -> Any:
+def joined(paths: Iterable[Path], name: TableName, tables: Tables) -> Any:
     """Read some files of one table as one Arrow table, sorted by its keys."""
     return _in_order(
         pyarrow().concat_tables([read_table(each, name, tables) for each in paths]), name
     )
 
 
-def read_table(path: Path, name: Name, tables: Tables) -> Any:
+def read_table(path: Path, name: TableName, tables: Tables) -> Any:
     """Read a file as an Arrow table and check all of its checksums."""
     with _opened(path, name, tables) as file:
         return file.read()
 
 
 @contextmanager
-def _opened(path: Path, name: Name, tables: Tables) -> Generator[Any]:
+def _opened(path: Path, name: TableName, tables: Tables) -> Generator[Any]:
     """Open a file of one of the tables; any damage is raised as an `InputError`."""
     arrow = pyarrow()
     try:
@@ -276,7 +276,7 @@ def _check_size(path: Path, claimed: Any) -> None:
         )
 
 
-def read_columns(paths: Sequence[Path], name: Name, tables: Tables) -> Columns:
+def read_columns(paths: Sequence[Path], name: TableName, tables: Tables) -> Columns:
     """Read the columns of a table's files, one after another, as arrays (rows, ..).
 
     Null is NaN in columns of floats, and -1 in columns of whole numbers. Text is an object, with

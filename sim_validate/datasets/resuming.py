@@ -18,8 +18,8 @@ from grasp_core.files.file_kinds import UNIT
 from grasp_core.files.records import RecordFile
 from grasp_core.messages import FieldError, shown
 from sim_validate.datasets.columns import dataset_tables
-from sim_validate.datasets.config import Name, SplitName
-from sim_validate.datasets.making_rows import Making
+from sim_validate.datasets.config import SplitName, TableName
+from sim_validate.datasets.making_rows import UnitRows
 from sim_validate.datasets.manifest import Listed, listed
 from sim_validate.datasets.parquet import parquet_bytes
 from sim_validate.datasets.work_units import WorkUnit
@@ -67,15 +67,15 @@ class Staging:
         """Remove the whole staging folder, once a finished dataset holds its contents."""
         shutil.rmtree(self.folder, ignore_errors=True)
 
-    def write(self, unit: WorkUnit, made: Making) -> None:
+    def write(self, unit: WorkUnit, made: UnitRows) -> None:
         """Keep the rows and files of a finished unit."""
-        kinds = dataset_tables(unit.config.groups)
+        kinds, rows = dataset_tables(unit.config.groups), made.rows
         tables = {
-            f"{name}.parquet": parquet_bytes(name, made.rows.cells(name, columns), kinds)
+            f"{name}.parquet": parquet_bytes(name, rows.cells(name, columns), kinds)
             for name, columns in kinds.items()
         }
         others = {f"{OTHER_FILES}/{path}": text.encode() for path, text in made.files.items()}
-        (row,) = made.rows.objects
+        (row,) = rows.objects
         self._put(unit, {**tables, **others}, object_id=row.object_id, split=row.split)
 
     def quarantine(self, unit: WorkUnit, reason: str) -> None:
@@ -86,25 +86,22 @@ class Staging:
         """Look up how a unit ended: with its object and split, or with a reason for no rows."""
         return UnitRecord.read(self.of(unit) / UnitRecord.FILE)
 
-    def not_done(self, units: Sequence[WorkUnit]) -> list[WorkUnit]:
-        """List the units that no earlier, interrupted build has finished, and remove their rests.
-
-        Their files, if there are any, are damaged.
-        """
+    def unfinished(self, units: Sequence[WorkUnit]) -> list[WorkUnit]:
+        """List the units that no earlier build has finished, and remove damaged rests of them."""
         self.folder.mkdir(exist_ok=True)
-        left = [unit for unit in units if not self.done(unit)]
-        for unit in left:
+        found = [unit for unit in units if not self.is_finished(unit)]
+        for unit in found:
             shutil.rmtree(self.of(unit), ignore_errors=True)
-        return left
+        return found
 
-    def done(self, unit: WorkUnit) -> bool:
+    def is_finished(self, unit: WorkUnit) -> bool:
         """Tell whether a unit is finished or quarantined, and all its files are as written."""
         try:
             return not any(each.fault(self.of(unit)) for each in self.record(unit).files)
         except (OSError, InputError):
             return False
 
-    def table(self, unit: WorkUnit, name: Name) -> Path:
+    def table(self, unit: WorkUnit, name: TableName) -> Path:
         """Return the path of a finished unit's rows in one of the tables."""
         return self.of(unit) / f"{name}.parquet"
 
@@ -119,8 +116,8 @@ class Staging:
                 record = UnitRecord(unit.object, unit.friction, kept, **more)
                 _kept(made / record.FILE, record.text().encode())
         except (OSError, InputError):
-            if not self.done(unit):  # otherwise another attempt was faster and wrote the same rows
-                raise
+            if not self.is_finished(unit):
+                raise  # otherwise another attempt was faster and wrote the same rows
 
 
 def _kept(path: Path, data: bytes) -> Path:

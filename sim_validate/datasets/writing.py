@@ -15,30 +15,16 @@ from typing import TypeAlias
 from grasp_core.files.file_kinds import QUARANTINE
 from grasp_core.files.text_files import write_text
 from grasp_core.provenance import arithmetic
-from sim_validate.datasets.card import CARD, card_text
+from sim_validate.datasets.card import card_text
 from sim_validate.datasets.columns import dataset_tables
 from sim_validate.datasets.config import SPLITS, DatasetConfig
 from sim_validate.datasets.given_grasps import given_text
-from sim_validate.datasets.manifest import (
-    LeftOut,
-    Listed,
-    Manifest,
-    left_out_text,
-    listed,
-    write_manifest,
-)
-from sim_validate.datasets.open_dataset import CONFIG
+from sim_validate.datasets.layout import CARD, CONFIG, DATA, FILE_FOLDERS, GIVEN_CONTACTS
+from sim_validate.datasets.manifest import Listed, Manifest, listed, write_manifest
 from sim_validate.datasets.parquet import joined, write_files
+from sim_validate.datasets.quarantine import TWIN, QuarantinedUnit, quarantine_text
 from sim_validate.datasets.resuming import OTHER_FILES, Staging, UnitRecord
 from sim_validate.datasets.work_units import WorkUnit, provenance, units_sha256
-
-DATA = "data"
-TWIN = "the same object as"
-"""First words of the reason why an object with the same mesh as another has no rows."""
-GIVEN_CONTACTS = "contacts.json"
-"""Name of the file with the given contacts, if there are any; its normals point into the object."""
-EXTRAS = ("meshes", "scenes")
-
 
 Finished: TypeAlias = tuple[WorkUnit, UnitRecord]
 
@@ -47,7 +33,7 @@ def write_rows(
     folder: Path, config: DatasetConfig, units: Sequence[WorkUnit], staging: Staging
 ) -> Manifest:  # fmt: skip
     """Write the rows and files of all units, and list what is there."""
-    for name in (DATA, *EXTRAS):
+    for name in (DATA, *FILE_FOLDERS):
         shutil.rmtree(folder / name, ignore_errors=True)
     good, quarantined = _sorted_out(units, staging)
     tables = _write_tables(config, good, staging, folder)
@@ -55,9 +41,9 @@ def write_rows(
         shutil.copytree(staging.of(unit) / OTHER_FILES, folder, dirs_exist_ok=True)
     others = [
         folder / CONFIG,
-        write_text(folder / QUARANTINE, left_out_text(quarantined)),
+        write_text(folder / QUARANTINE, quarantine_text(quarantined)),
         *_write_given(folder, units),
-        *(path for name in EXTRAS for path in sorted((folder / name).glob("*"))),
+        *(path for name in FILE_FOLDERS for path in sorted((folder / name).glob("*"))),
     ]
     return Manifest(
         config_sha256=config.sha256,
@@ -77,17 +63,17 @@ def _write_given(folder: Path, units: Sequence[WorkUnit]) -> list[Path]:
     return [write_text(folder / GIVEN_CONTACTS, given_text(in_order))] if given else []
 
 
-def close(folder: Path, config: DatasetConfig, manifest: Manifest) -> None:
+def write_card_and_manifest(folder: Path, config: DatasetConfig, rows: Manifest) -> None:
     """Write the README.md of a dataset, and then the manifest, which marks it as finished."""
-    card = write_text(folder / CARD, card_text(config, manifest))
-    write_manifest(folder, replace(manifest, files=(*manifest.files, listed(folder, card))))
+    card = write_text(folder / CARD, card_text(config, rows))
+    write_manifest(folder, replace(rows, files=(*rows.files, listed(folder, card))))
 
 
 def _sorted_out(
     units: Sequence[WorkUnit], staging: Staging
-) -> tuple[list[Finished], list[LeftOut]]:
+) -> tuple[list[Finished], list[QuarantinedUnit]]:
     """List units with rows of their own, sorted by object, and the reasons why others have none."""
-    good, quarantined = list[Finished](), list[LeftOut]()
+    good, quarantined = list[Finished](), list[QuarantinedUnit]()
     first: dict[tuple[str | None, float], WorkUnit] = {}
     for unit in sorted(units, key=lambda each: (each.label, each.source_sha256, each.friction)):
         record = staging.record(unit)
@@ -99,7 +85,9 @@ def _sorted_out(
                 continue
             reason = f"{TWIN} {other.label}"
         given = tuple(each.id for each in unit.given)
-        quarantined.append(LeftOut(unit.label, unit.source_sha256, unit.friction, given, reason))
+        quarantined.append(
+            QuarantinedUnit(unit.label, unit.source_sha256, unit.friction, given, reason)
+        )
     return sorted(good, key=lambda each: (str(each[1].object_id), each[0].friction)), quarantined
 
 

@@ -69,13 +69,13 @@ def hand_controls(
 ) -> tuple[HandControl, ...]:
     """Make the negative controls that exist for a hand, at most one of each kind."""
     at_limit = weakest.limit.wrench
-    told = f"the load is {OVERLOAD:g} times the predicted limit"
-    found = list(_proved("overloaded", told, case, at_limit, OVERLOAD))
+    explanation = f"the load is {OVERLOAD:g} times the predicted limit"
+    found = list(_proved("overloaded", explanation, case, at_limit, OVERLOAD))
     weak = WEAK_MOTORS * case.motors.limits
     if (np.abs(case.motors.gravity) < weak).all():
         motors = replace(case.motors, limits=weak)
-        told = f"every motor has {WEAK_MOTORS:g} of the torque that the load needs"
-        found += _proved("weak_motors", told, replace(case, motors=motors), at_limit, 1.0)
+        explanation = f"every motor has {WEAK_MOTORS:g} of the torque that the load needs"
+        found += _proved("weak_motors", explanation, replace(case, motors=motors), at_limit, 1.0)
     return (*found, *_dead_motor(case, at_limit, names), *_low_friction(case, at_limit))
 
 
@@ -91,27 +91,27 @@ def _dead_motor(case: HandCase, at_limit: Array, names: tuple[str, ...]) -> Iter
         found.append((rounded(dead.limit(at_limit).upper), joint, dead))
     if found:
         _, joint, dead = min(found, key=lambda each: each[:2])
-        told = f"the motor of {names[joint]} is dead"
-        yield from _proved("dead_motor", told, dead, at_limit, USUAL_LOAD)
+        explanation = f"the motor of {names[joint]} is dead"
+        yield from _proved("dead_motor", explanation, dead, at_limit, USUAL_LOAD)
 
 
 def _low_friction(case: HandCase, at_limit: Array) -> Iterator[HandControl]:
     for share in FRICTIONS:
         slippery = replace(case, friction=rounded(share * case.friction))
-        told = f"the friction is {slippery.friction:.3g} instead of {case.friction:.3g}"
-        found = list(_proved("low_friction", told, slippery, at_limit, USUAL_LOAD))
+        explanation = f"the friction is {slippery.friction:.3g} instead of {case.friction:.3g}"
+        found = list(_proved("low_friction", explanation, slippery, at_limit, USUAL_LOAD))
         if found:
             yield from found
             return
 
 
 def _proved(
-    name: str, told: str, case: HandCase, at_limit: Array, share: float
+    name: str, explanation: str, case: HandCase, at_limit: Array, share: float
 ) -> Iterator[HandControl]:
     """Yield a control if the proof leaves no doubt that it cannot hold a share of a wrench."""
     proof = case.limit(to_digits(share * at_limit))
     if proof.upper <= 1.0 - EXCESS:
-        yield HandControl(name, told, case.friction, case.motors.limits, share, proof)
+        yield HandControl(name, explanation, case.friction, case.motors.limits, share, proof)
 
 
 @declared
@@ -129,11 +129,11 @@ class HandControlVerdict(Declared):
 
 
 def try_hand_control(
-    scene: HandScene, control: HandControl, limit: TrialLoad, setup: Setup
+    scene: HandScene, control: HandControl, load_at_limit: TrialLoad, setup: Setup
 ) -> HandControlVerdict:
     """Hold what a control must let go of, after the high friction of the grasp itself."""
     weak = scene.limited(control.limits, control.friction)
     high = setup.hold.settling_friction * scene.layout.friction
     rig = closed_on(weak, setup, control.friction, high)
-    (trace,) = rig.traced(rig.holds([part(rig.idle, limit, control.share)], [high]))
+    (trace,) = rig.traced(rig.holds([part(rig.idle, load_at_limit, control.share)], [high]))
     return HandControlVerdict(control, judge(trace, scene.layout, setup.hold))

@@ -65,8 +65,8 @@ def validate_hand(
     setup.physics.require_hard(
         "for a hand", "levers of motors have no column for the torque of a contact"
     )
-    scene = build_hand_scene(hand, body, reach, friction, down=down, physics=setup.physics)
     contacts = closed_stance(hand, reach, friction).contacts
+    scene = build_hand_scene(hand, body, reach, friction, down=down, physics=setup.physics)
     gate = checked(ClosureCase.of(setup, friction, body.radius))
     known = checked(KnownHand.of(setup, friction))
     rig = closed_on(scene, setup, friction, setup.hold.settling_friction * friction)
@@ -76,7 +76,7 @@ def validate_hand(
     controls = list[HandControlVerdict]()
     if agenda.controls:
         weakest = next(planned for planned in loads if planned.name == WEAKEST)
-        names = tuple(joint.name for joint in scene.hand.hand.joints)
+        names = tuple(joint.name for joint in hand.joints)
         for control in hand_controls(case, weakest, names):
             controls.append(try_hand_control(scene, control, weakest.limit, setup))
     return HandVerdict(

@@ -57,7 +57,7 @@ FILE_KINDS: Mapping[str, FileKind] = {
     "manifest": FileKind(files.MANIFEST, "sim_validate.datasets.manifest:Manifest"),
     "unit": FileKind(files.UNIT, "sim_validate.datasets.resuming:UnitRecord"),
     "quarantine": FileKind(f"line of {files.QUARANTINE}",
-                           "sim_validate.datasets.manifest:LeftOut"),
+                           "sim_validate.datasets.quarantine:QuarantinedUnit"),
     "baseline": FileKind(files.BASELINE, "sim_validate.baselines.baseline:Baseline"),
     "analyses": FileKind(files.ANALYSES, "sim_validate.planning.analyze:Analyses"),
     "wrenches": FileKind(files.WRENCH_FILE, "sim_validate.engine.setup:WrenchFile"),

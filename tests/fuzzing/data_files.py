@@ -23,7 +23,8 @@ from sim_validate.commands.config_file import flags_from
 from sim_validate.commands.simulation_flags import RunFlags
 from sim_validate.datasets.config import DatasetConfig, config_to_toml
 from sim_validate.datasets.given_grasps import given_from_json
-from sim_validate.datasets.manifest import Listed, Manifest, left_out_from
+from sim_validate.datasets.manifest import Listed, Manifest
+from sim_validate.datasets.quarantine import quarantine_from
 from sim_validate.datasets.resuming import UnitRecord
 from sim_validate.engine.setup import Agenda, Setup, wrenches_from_json
 from sim_validate.execution.verdict import ExecutedGrasp, Executions
@@ -293,7 +294,7 @@ TARGETS = (
     _record("staged", UnitRecord, UNIT.text),
     Target("wrenches", lambda data: wrenches_from_json(text_of(data)), lambda: [_json(WRENCHES)],
            _same_wrenches, "json"),
-    Target("quarantine", lambda data: left_out_from(text_of(data)),
+    Target("quarantine", lambda data: quarantine_from(text_of(data)),
            lambda: [_json(LEFT_OUT) + b"\n" + _json(LEFT_OUT) + b"\n"], _same_lines, "json"),
     Target("setup", _tables(lambda tables: Setup.of_table(tables, usual=Setup())), lambda: [SETUP],
            _same_settings, "toml"),

@@ -3,8 +3,9 @@ import re
 
 import pytest
 
-from sim_validate.datasets.card import CARD, card_text
+from sim_validate.datasets.card import card_text
 from sim_validate.datasets.columns import TABLES
+from sim_validate.datasets.layout import CARD
 from sim_validate.datasets.manifest import read_manifest
 from sim_validate.datasets.verify import verify
 from tests.sim_validate.datasets.configs import SMALL

@@ -10,7 +10,7 @@ import grasp_core as gc
 from grasp_core.processes import local_processes
 from sim_validate.datasets.build import build
 from sim_validate.datasets.clusters import dask_workers, ray_workers
-from sim_validate.datasets.computing import compute_all, do_unit
+from sim_validate.datasets.computing import compute_all, compute_unit
 from sim_validate.datasets.config import DatasetConfig
 from sim_validate.datasets.resuming import Staging
 from sim_validate.datasets.work_units import units_of
@@ -41,7 +41,7 @@ def faulty(unit, staging):
         os.kill(os.getpid(), signal.SIGKILL)
     if unit.object == "prism":
         time.sleep(100.0)
-    do_unit(unit, staging)
+    compute_unit(unit, staging)
 
 
 def niceness(_):

@@ -12,7 +12,7 @@ from grasp_core.processes import local_processes
 from sim_validate.datasets import clusters
 from sim_validate.datasets import computing as workers
 from sim_validate.datasets.build import build
-from sim_validate.datasets.computing import UnitJob, compute_all, do_task, do_unit
+from sim_validate.datasets.computing import UnitTask, compute_all, compute_in_worker, compute_unit
 from sim_validate.datasets.config import DatasetConfig
 from sim_validate.datasets.resuming import Staging
 from sim_validate.datasets.work_units import WorkerError, provenance, units_of
@@ -30,8 +30,8 @@ def staging(tmp_path):
     return made
 
 
-def task(staging, work, timeout_s=HANGING_S):
-    return UnitJob(units_of(CONFIG)[0], staging, dict(provenance()), timeout_s, work)
+def task(staging, compute, timeout_s=HANGING_S):
+    return UnitTask(units_of(CONFIG)[0], staging, dict(provenance()), timeout_s, compute)
 
 
 def sleep(*_):
@@ -55,7 +55,7 @@ def test_a_worker_with_another_version_refuses_and_the_run_ends(tmp_path, monkey
 
 def test_a_worker_that_does_not_see_the_folder_says_so(tmp_path):
     with pytest.raises(WorkerError, match="file system that all processes share"):
-        do_task(task(Staging(tmp_path / "elsewhere"), sleep))
+        compute_in_worker(task(Staging(tmp_path / "elsewhere"), sleep))
 
 
 @pytest.mark.parametrize("timeout_s", [None, HANGING_S, 1e300])
@@ -63,14 +63,14 @@ def test_a_time_limit_needs_nothing_that_windows_lacks(staging, timeout_s):
     given = task(staging, lambda unit, to: to.quarantine(unit, "done"), timeout_s)
     with pytest.MonkeyPatch.context() as patched:
         patched.delattr("signal.setitimer", raising=False)
-        do_task(given)
+        compute_in_worker(given)
     assert staging.record(given.unit).reason == "done"
 
 
 def test_rows_that_do_not_arrive_end_the_run(staging):
     class Elsewhere(Here):
         def submit(self, function, given):
-            return super().submit(function, dataclasses.replace(given, work=lambda *_: None))
+            return super().submit(function, dataclasses.replace(given, compute=lambda *_: None))
 
     with pytest.raises(WorkerError, match="rows that do not appear"):
         compute_all(units_of(CONFIG), staging, Elsewhere(), silent)
@@ -117,28 +117,28 @@ def test_a_worker_that_does_not_see_a_mesh_ends_the_run(tmp_path):
 
 def test_a_fault_of_ours_with_one_object_does_not_stop_the_others(tmp_path, monkeypatch):
     config = dataclasses.replace(CONFIG, objects=("tetrahedron", "wedge"))
-    plain = workers.made_of
+    plain = workers.compute_rows
 
     def faulty(unit, body):
         if unit.object == "wedge":
             raise ZeroDivisionError("a bug")
         return plain(unit, body)
 
-    monkeypatch.setattr(workers, "made_of", faulty)
+    monkeypatch.setattr(workers, "compute_rows", faulty)
     built = build(config, tmp_path / "ds", Here(), silent)
     assert (built.manifest.quarantined, built.manifest.rows["objects"]) == (1, 1)
-    left_out = (tmp_path / "ds" / "quarantine.jsonl").read_text()
-    assert "internal error: ZeroDivisionError: a bug" in left_out
+    quarantine = (tmp_path / "ds" / "quarantine.jsonl").read_text()
+    assert "internal error: ZeroDivisionError: a bug" in quarantine
 
 
 @pytest.mark.slow
 def test_a_process_that_never_ends_is_ended(staging):
     with local_processes(1) as engine:
         for never in (sleep, burn):
-            failed = engine.submit(do_task, task(staging, never, 0.5)).exception(HANGING_S)
-            assert failed is not None
-        given = task(staging, do_unit)
-        engine.submit(do_task, given).result()
+            ended = engine.submit(compute_in_worker, task(staging, never, 0.5))
+            assert ended.exception(HANGING_S) is not None
+        given = task(staging, compute_unit)
+        engine.submit(compute_in_worker, given).result()
     assert staging.of(given.unit).is_dir()
 
 

@@ -18,7 +18,8 @@ from sim_validate.datasets.columns import GraspRow
 from sim_validate.datasets.config import DatasetConfig
 from sim_validate.datasets.learning import execution_cells, execution_rows
 from sim_validate.datasets.open_dataset import select
-from sim_validate.datasets.verify import loose_differences, verify
+from sim_validate.datasets.recomputing import verdict_differences
+from sim_validate.datasets.verify import verify
 from sim_validate.execution.verdict import CLEAR_OF_SLIP, ExecutedGrasp
 from tests.sim_validate.datasets.configs import rows_of
 from tests.sim_validate.datasets.engines import Here, silent
@@ -121,10 +122,10 @@ def test_trials_that_come_out_otherwise_are_named(copied):
 def test_survival_may_differ_by_rounding_only_where_contacts_slip(executed):
     survived = next(row for row in select(executed).rows(GraspRow) if row.survived)
     kept = replace(survived, predicted_first_slip=2.0 * CLEAR_OF_SLIP)
-    (said,) = loose_differences(kept, replace(kept, survived=False))
+    (said,) = verdict_differences(kept, replace(kept, survived=False))
     assert "survived is True, but False by computing it again" in said
     slipping = replace(kept, predicted_first_slip=1.0)
-    assert list(loose_differences(slipping, replace(slipping, survived=False))) == []
+    assert list(verdict_differences(slipping, replace(slipping, survived=False))) == []
 
 
 def test_a_grasp_without_a_squeeze_did_not_survive_and_a_refused_one_is_not_known():

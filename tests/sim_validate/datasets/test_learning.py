@@ -17,7 +17,7 @@ from sim_validate.closure.validate import validate
 from sim_validate.datasets import learning as varied_figures
 from sim_validate.datasets.config import Learning
 from sim_validate.datasets.learning import VARIED_RATIOS, execution_cells, region_exit, variants
-from sim_validate.datasets.making_rows import Making
+from sim_validate.datasets.making_rows import UnitRows
 from sim_validate.datasets.verify import verify
 from sim_validate.datasets.work_units import units_of
 from sim_validate.engine.setup import Agenda
@@ -280,7 +280,7 @@ def test_a_varied_grasp_beyond_the_simulator_leaves_the_others(monkeypatch):
     unit = next(unit for unit in units_of(LEARNED) if unit.object == WEDGE.name)
     verdict = validate(WEDGE, grasp, 0.5, agenda=Agenda(controls=False))
     monkeypatch.setattr(varied_figures, "execute", unfaithful)
-    tried = Making(unit, WEDGE).varied(variant, verdict)
+    tried = UnitRows(unit, WEDGE)._tried_variant(variant, verdict)
     assert tried.executed == "the simulator is not faithful here"
     assert execution_cells(tried.executed)["executed"] is False
     assert "survived" not in execution_cells(tried.executed)

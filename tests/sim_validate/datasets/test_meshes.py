@@ -3,7 +3,8 @@ import pytest
 
 import grasp_core as gc
 from scenes.example_objects import example_names, example_object
-from sim_validate.datasets.open_dataset import CONFIG, Dataset, mesh_path, mesh_text
+from sim_validate.datasets.layout import CONFIG
+from sim_validate.datasets.open_dataset import Dataset, mesh_path, mesh_text
 from tests.grasp_core.planning import test_recorded_surfaces as recorded
 
 NAMES = [*(name for name in example_names() if "FACES" not in name), "random-30-1"]

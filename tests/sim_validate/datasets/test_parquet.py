@@ -11,7 +11,7 @@ from sim_validate.closure.verdict import Verdict, WrenchVerdict
 from sim_validate.datasets import parquet
 from sim_validate.datasets.columns import TABLES, GraspRow
 from sim_validate.datasets.config import KEYS, DatasetConfig
-from sim_validate.datasets.making_rows import made_of, split_of
+from sim_validate.datasets.making_rows import compute_rows, split_of
 from sim_validate.datasets.parquet import TableColumn, agrees, each_batch, parquet_bytes, read_table
 from sim_validate.datasets.work_units import body_of, units_of
 from sim_validate.engine.held_or_let_go import HoldVerdict
@@ -27,7 +27,7 @@ def unit():
 
 @pytest.fixture(scope="module")
 def rows(unit):
-    made = made_of(unit, body_of(unit)).rows
+    made = compute_rows(unit, body_of(unit)).rows
     return {name: made.cells(name, columns) for name, columns in TABLES.items()}
 
 

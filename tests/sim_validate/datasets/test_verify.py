@@ -85,7 +85,7 @@ def shifted(rows, column):
     row[column] *= 1.0 + 1e-4
 
 
-def left_out(folder):
+def quarantined(folder):
     """Remove a grasp, and all that was made from it, from the tables."""
     (first, *_) = rows_of(folder, "grasps")
     gone = first["grasp_id"]
@@ -100,7 +100,7 @@ def left_out(folder):
 
 
 def test_what_comes_out_otherwise_is_named(copy):
-    gone = left_out(copy)
+    gone = quarantined(copy)
     changes = [
         ("objects", lambda rows: shifted(rows, "volume_m3"), "volume_m3 is"),
         ("grasps", lambda rows: shifted(rows, "ferrari_canny_lower_n"), "ferrari_canny_lower_n is"),

@@ -1,0 +1,19 @@
+"""Names the files and folders that a dataset's folder holds."""
+
+from grasp_core.files.file_kinds import MANIFEST, QUARANTINE
+
+CONFIG = "config.toml"
+CARD = "README.md"
+GIVEN_CONTACTS = "contacts.json"
+"""Name of the file with the given contacts, if there are any; its normals point into the object."""
+DATA = "data"
+"""Folder of the tables, each of which has a folder in it."""
+MESH_FOLDER, SCENE_FOLDER = "meshes", "scenes"
+FILE_FOLDERS = (MESH_FOLDER, SCENE_FOLDER)
+"""Folders of the files that are beside the tables."""
+STAGING_FOLDER = "staging"
+"""Folder of finished units of work, which is there until the dataset is finished."""
+OWN_FILES = (
+    STAGING_FOLDER, DATA, *FILE_FOLDERS, GIVEN_CONTACTS, CONFIG, QUARANTINE, CARD, MANIFEST,
+)  # fmt: skip
+"""Names of all files and folders that a build writes."""
