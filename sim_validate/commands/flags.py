@@ -1,6 +1,6 @@
 """The flags of commands: one class per command, one field per flag, and groups that they share.
 
-The range of a flag is that of its type; ranges that several flags share are in `grasp_core/kinds`.
+The range of a flag is that of its type; ranges that several flags share are in `allowed_values`.
 This module imports nothing that is slow to load, so that help and usage errors answer at once.
 """
 
