@@ -27,6 +27,8 @@ from grasp_core.messages import FieldError
 from grasp_core.settings import Settings
 from scenes.settings import SAMPLE_S, HeldSettings
 
+USUAL_FRICTION = 0.5
+"""Coulomb coefficient where none is given."""
 Duration = Annotated[float, Interval(ge=0.05, le=60.0)]
 SettlingFriction = Annotated[float, Interval(ge=1.0, le=100.0)]
 Rounds = Annotated[int, Interval(ge=1, le=40)]

@@ -39,7 +39,7 @@ from sim_validate.engine.setup import Agenda, Setup, wrenches_from_file
 from sim_validate.execution.execute import ExecutionJob, executed_grasp
 from sim_validate.execution.verdict import ExecutedGrasp
 from sim_validate.files.toml_files import read_tables
-from sim_validate.settings import ExecutionSettings, LimitSearch, Noise
+from sim_validate.settings import USUAL_FRICTION, ExecutionSettings, LimitSearch, Noise
 
 SUITE_ENDING = ".grasps.toml"
 AGENDA_SETTINGS = ("limits", "random_wrenches", "repeats", "noise", "seed")
@@ -188,7 +188,6 @@ def suite_from_tables(given: Mapping[str, Any], path: Path) -> Suite:
     return replace(suite, path=path, **found)
 
 
-USUAL_FRICTION = 0.5
 TRIALS = ("wrenches", "repeats", "noise", "random_wrenches", "seed")
 PLAN_SETTINGS = ("object", "friction", "limit", "families", "cones", "seed", "unit", "scale")
 

@@ -57,12 +57,13 @@ from sim_validate.engine.simulated_limits import SimulatedLimit, bisected_limits
 from sim_validate.engine.stepping import Bench
 from sim_validate.processes.own_faults import OWN_FAULTS
 from sim_validate.processes.workers import each, processes
+from sim_validate.settings import USUAL_FRICTION
 
 
 def validate(
     body: Polyhedron,
     grasp: Grasp,
-    friction: float = 0.5,
+    friction: float = USUAL_FRICTION,
     *,
     agenda: Agenda | None = None,
     setup: Setup | None = None,
@@ -227,7 +228,7 @@ VerdictProgress: TypeAlias = Callable[[int, int, Verdict], object]
 def validate_all(
     body: Polyhedron,
     grasps: Iterable[Grasp],
-    friction: float = 0.5,
+    friction: float = USUAL_FRICTION,
     *,
     agenda: Agenda | None = None,
     setup: Setup | None = None,

@@ -65,6 +65,7 @@ from sim_validate.engine.setup import Setup
 from sim_validate.engine.simulated_friction import bisected, forces_just_above, released_friction
 from sim_validate.engine.simulated_limits import SimulatedLimit, bisected_limits, ramped_limits
 from sim_validate.engine.stepping import CLOCK_SLACK_S, Bench
+from sim_validate.settings import USUAL_FRICTION
 
 LEAST_OFFSET, MOST_OFFSET_FRICTION = 0.01, 1.0
 """Least and largest critical friction that two offset fingers on the box can be made to need."""
@@ -72,7 +73,7 @@ PUSH = 0.6
 """Normal force of the fingers on the box, relative to the largest normal force allowed."""
 
 
-USUAL_FRICTION, USUAL_RADIUS_M = 0.5, 0.07
+USUAL_RADIUS_M = 0.07
 
 
 @dataclass(frozen=True, slots=True)

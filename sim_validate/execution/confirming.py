@@ -17,10 +17,10 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from scenes.mujoco.held_scene import held_physics
+from sim_validate.engine.simulated_friction import LEAST_PUSHING
 from sim_validate.execution.paths import TrialDrive
 from sim_validate.execution.simulate import (
     FULL_LOAD,
-    IDLE,
     HeldBench,
     HeldMotion,
     TrialFigures,
@@ -161,7 +161,8 @@ def run_again(
 def _begin(trial: Trial, motion: HeldMotion) -> int:
     """Return the sample after which a trial is run again, zero if nothing says when it slips."""
     layout = motion.layout
-    pushing = np.linalg.norm(layout.pushes, axis=1) > IDLE * float(np.abs(layout.pushes).max())
+    pushes, largest = np.linalg.norm(layout.pushes, axis=1), float(np.abs(layout.pushes).max())
+    pushing = pushes > LEAST_PUSHING * largest
     if (motion.forces[trial.begun, pushing] == 0.0).all(axis=1).any():
         return 0
     trouble = first_trouble(motion, layout.friction, trial.begun)

@@ -133,12 +133,12 @@ class HeldCase:
         """Return shares of a load that grows in a time given in reciprocal frequencies, (n,)."""
         return smoother(samples(max(SHORTEST_RISE_S, slow / self.frequency)))
 
-    def held_box(self) -> HeldScene:
+    def held_scene(self) -> HeldScene:
         """Build the scene of the box between its fingers."""
         a, b, _ = self.halves
         return self._boxed([(a, 0.0, 1, 0), (-a, 0.0, -1, 0), (0.0, b, 0, 1), (0.0, -b, 0, -1)])
 
-    def clamped_box(self) -> HeldScene:
+    def clamped_scene(self) -> HeldScene:
         """Build the scene of the box with two fingers on each of the faces across x."""
         a, b, _ = self.halves
         return self._boxed([(x * a, 0.5 * y * b, x, 0) for x in (1, -1) for y in (1, -1)])
@@ -153,8 +153,8 @@ class HeldCase:
 
     def checks(self) -> tuple[GateCheck, ...]:
         """Measure all figures."""
-        faces = (*on_faces(self, "box"), *on_faces(self, "l-bracket"))
-        return (*held_box(self), *free_box(self), struck_box(self), *faces)
+        faces = (*face_checks(self, "box"), *face_checks(self, "l-bracket"))
+        return (*held_box_checks(self), *free_box_checks(self), struck_box_check(self), *faces)
 
     def scene(
         self, body: Polyhedron, contacts: list[Contact], squeeze: Array, tip_radius_m: float
@@ -170,12 +170,12 @@ class HeldCase:
         return build_held_scene(body, held, settings, physics=self.physics)
 
 
-def met(name: str, motion: HeldMotion, ratio: float) -> GateCheck:
+def ratio_check(name: str, motion: HeldMotion, ratio: float) -> GateCheck:
     """Check that a figure of a motion, over what is known in closed form, is one."""
     return near(name, None if motion.health.fault else ratio, TOLERANCE)
 
 
-def little(name: str, motion: HeldMotion, value: float, most: float = TOLERANCE) -> GateCheck:
+def bound_check(name: str, motion: HeldMotion, value: float, most: float = TOLERANCE) -> GateCheck:
     """Check that a figure of a motion is at most as large as it may be."""
     return GateCheck(name, math.nan if motion.health.fault else value, 0.0, most)
 
@@ -224,9 +224,9 @@ SETTLING_TIMES = 8.0
 """Time that a held load stays before it is in the damper's own times c / k."""
 
 
-def held_box(case: HeldCase) -> tuple[GateCheck, ...]:
+def held_box_checks(case: HeldCase) -> tuple[GateCheck, ...]:
     """Check the load of slip, the deflection, the frequencies, and a palm in uniform motion."""
-    bench = HeldBench(case.held_box())
+    bench = HeldBench(case.held_scene())
     _, start = bench.settled(paths.closing(SQUEEZE_SETTLE_S))
     ramps = [_ramp(case, 0.0), _ramp(case, RISING)]
     lag = SETTLING_TIMES * 2.0 * case.damping_ratio / case.frequency
@@ -249,16 +249,16 @@ def held_box(case: HeldCase) -> tuple[GateCheck, ...]:
     apart = float(np.abs(uniform.shifts - rest.shifts).max()) / spring
     pulled = float(np.abs(uniform.pushes - rest.pushes).max()) / case.light_n
     return (
-        met("weight at which a held box slips, over 4 mu N", motions[0], slips[0]),
+        ratio_check("weight at which a held box slips, over 4 mu N", motions[0], slips[0]),
         _oblique(case),
-        met("m (g + a) at which a held box slips in a palm that rises, over 4 mu N", motions[1],
-            slips[1]),
-        *(met(f"deflection along {axis}, over load / 4 k", motions[2], ratio)
+        ratio_check("m (g + a) at which a held box slips in a palm that rises, over 4 mu N",
+                    motions[1], slips[1]),
+        *(ratio_check(f"deflection along {axis}, over load / 4 k", motions[2], ratio)
           for axis, ratio in zip("xyz", gone.tolist(), strict=True)),
-        little("motion that uniform motion of the palm adds, over the deflection", motions[3],
-               apart),
-        little("contact force that uniform motion of the palm adds, over the load", motions[3],
-               pulled),
+        bound_check("motion that uniform motion of the palm adds, over the deflection", motions[3],
+                    apart),
+        bound_check("contact force that uniform motion of the palm adds, over the load", motions[3],
+                    pulled),
         _creep(case, motions[2]),
         _jumps(case, motions[4]),
         *_rings(replace(case, damping_ratio=RING_DAMPING)),
@@ -266,13 +266,13 @@ def held_box(case: HeldCase) -> tuple[GateCheck, ...]:
 
 
 def _oblique(case: HeldCase) -> GateCheck:
-    bench = HeldBench(case.clamped_box())
+    bench = HeldBench(case.clamped_scene())
     _, start = bench.settled(paths.closing(SQUEEZE_SETTLE_S))
     drive = _ramp(case, 0.0, np.array([0.0, math.sin(OBLIQUE), -math.cos(OBLIQUE)]))
     (motion,) = bench.run([drive], start)
     found = outcome(motion, drive, bench.scene.layout.friction)
     name = "weight at which a box slips obliquely across its contacts, over 4 mu N"
-    return met(name, motion, (1.0 + WINDOW) * found.first_slip)
+    return ratio_check(name, motion, (1.0 + WINDOW) * found.first_slip)
 
 
 def _ramp(case: HeldCase, rising: float, way: Array = DOWN) -> TrialDrive:
@@ -292,7 +292,7 @@ def _creep(case: HeldCase, motion: HeldMotion) -> GateCheck:
     longest = len(paths.turned_weight(case.frequency)) * SAMPLE_S
     far = speed * longest / (SLIPPED_BY * case.radius_m)
     name = "creep of contacts that stick in a whole trial, over what counts as slipped"
-    return little(name, motion, far, CREEP)
+    return bound_check(name, motion, far, CREEP)
 
 
 def _jumps(case: HeldCase, motion: HeldMotion) -> GateCheck:
@@ -314,7 +314,7 @@ def _jumps(case: HeldCase, motion: HeldMotion) -> GateCheck:
     # the simulator may be one step late, in which x'' changes by (1 + 2 zeta) w h of the jump
     late = (1.0 + 2.0 * zeta) * w * held_physics(motion.layout).timestep * share
     name = "error of contact forces while a load comes and goes suddenly, over the load"
-    return little(name, motion, off, late)
+    return bound_check(name, motion, off, late)
 
 
 def _period(case: HeldCase) -> int:
@@ -324,7 +324,7 @@ def _period(case: HeldCase) -> int:
 
 def _rings(case: HeldCase) -> list[GateCheck]:
     """Knock the box along and about all axes at once, and check how fast each of them rings."""
-    scene = case.held_box()
+    scene = case.held_scene()
     _, start = HeldBench(scene).settled(paths.closing(SQUEEZE_SETTLE_S))
     stiff, mass, damper = _modes(case, np.diag(scene.layout.inertia_kg_m2))
     undamped = np.sqrt(stiff / mass)
@@ -341,8 +341,8 @@ def _rings(case: HeldCase) -> list[GateCheck]:
     names = [f"{word} {axis}" for word in ("along", "about") for axis in "xyz"]
     rates = np.sqrt(stiff / mass - (0.5 * damper / mass) ** 2)
     return [
-        met(f"frequency of a ring {name}, over that of mass and springs", motion,
-            ring_frequency(points, rate, bench.sample_s) / rate)
+        ratio_check(f"frequency of a ring {name}, over that of mass and springs", motion,
+                    ring_frequency(points, rate, bench.sample_s) / rate)
         for name, points, rate in zip(names, rung.T, rates.tolist(), strict=True)
     ]  # fmt: skip
 
@@ -386,9 +386,9 @@ RAISED = 4.0
 """Height of the lift, relative to the way by which the springs give under the weight."""
 
 
-def free_box(case: HeldCase) -> tuple[GateCheck, ...]:
+def free_box_checks(case: HeldCase) -> tuple[GateCheck, ...]:
     """Check the fall, the velocities after a knock, and what a table carries."""
-    bench = HeldBench(case.held_box())
+    bench = HeldBench(case.held_scene())
     steps, flight = round(FALL_S / SAMPLE_S), round(FLIGHT_S / SAMPLE_S)
     speed_m_per_s = case.radius_m / FLIGHT_S  # takes the box by one radius, not to the fingers
     wrenches = np.zeros((flight, 6))
@@ -406,9 +406,9 @@ def free_box(case: HeldCase) -> tuple[GateCheck, ...]:
     turns = 2.0 * np.arctan2(knock.turned[:, 3], knock.turned[:, 0])
     rate = float(turns[-1] - turns[1]) / time
     return (
-        met("fall of a box that nothing holds, over g t^2 / 2", fall, fallen),
-        met("velocity after a knock, over J / m", knock, speed / speed_m_per_s),
-        met("rate of turning after a knock, over L / I", knock, rate / KNOCK_RAD_PER_S),
+        ratio_check("fall of a box that nothing holds, over g t^2 / 2", fall, fallen),
+        ratio_check("velocity after a knock, over J / m", knock, speed / speed_m_per_s),
+        ratio_check("rate of turning after a knock, over L / I", knock, rate / KNOCK_RAD_PER_S),
         *_lifted(case, bench),
     )
 
@@ -434,8 +434,8 @@ def _lifted(case: HeldCase, bench: HeldBench) -> tuple[GateCheck, GateCheck]:
     before = float(carried[begun - still : begun].mean())
     after = float(np.abs(carried[-still:]).max())
     return (
-        met("weight that a table carries before a lift, over m g", motion, before),
-        little("weight that a table carries after a lift, over m g", motion, after),
+        ratio_check("weight that a table carries before a lift, over m g", motion, before),
+        bound_check("weight that a table carries after a lift, over m g", motion, after),
     )
 
 
@@ -450,9 +450,9 @@ CHANGED = 0.25
 by 0.4 and more."""
 
 
-def struck_box(case: HeldCase) -> GateCheck:
+def struck_box_check(case: HeldCase) -> GateCheck:
     """Check how much short steps change the motion of a box that is struck off its fingers."""
-    scene, blow = case.held_box(), _blow(case)
+    scene, blow = case.held_scene(), _blow(case)
     step_s = held_physics(scene.layout).timestep / STEPS_SHORTER
     motions = list[HeldMotion]()
     for bench in (HeldBench(scene), HeldBench(scene, step_s=step_s)):
@@ -475,7 +475,7 @@ def _blow(case: HeldCase) -> TrialDrive:
     return replace(idle(len(wrenches)), wrenches=wrenches)
 
 
-def on_faces(case: HeldCase, name: str) -> tuple[GateCheck, ...]:
+def face_checks(case: HeldCase, name: str) -> tuple[GateCheck, ...]:
     """Check normals, depths and forces of fingertips on each face of an object."""
     body = sized(name, case.radius_m)
     pieces = [(piece, face.normal) for face in body.faces for piece in face.pieces]
@@ -495,8 +495,8 @@ def on_faces(case: HeldCase, name: str) -> tuple[GateCheck, ...]:
     missed = np.linalg.norm(forces - pushes[:, None] * normals, axis=1) / pushes
     return (
         *touch_checks(found, normals, depths, f", on a {name}"),
-        little(f"error of a contact's force under even pressure, on a {name}", motion,
-               float(np.max(missed))),  # NaN if one is
+        bound_check(f"error of a contact's force under even pressure, on a {name}", motion,
+                    float(np.max(missed))),  # NaN if one is
     )  # fmt: skip
 
 

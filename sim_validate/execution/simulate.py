@@ -40,6 +40,7 @@ from grasp_core.errors import InputError
 from grasp_core.execution.first_slip import slip_steps
 from scenes.mujoco.held_scene import SAMPLE_S, HeldLayout, HeldScene, hinged, palm_armature
 from scenes.mujoco.mjcf_text import rotations
+from sim_validate.engine.simulated_friction import LEAST_PUSHING
 from sim_validate.engine.stepping import OBJECT_END, PALM_END, Bench, Health, Motion, Told
 from sim_validate.execution.paths import WHOLE_SLACK, SampleRows, TrialDrive, closing
 
@@ -283,8 +284,6 @@ hold again, and rolling over large turns is known to about a tenth of it."""
 TOUCH_SLIDE = 1e-4
 """Distance that a contact on its cone may slide while an object leaves a table and still count as
 held, in object radii: contacts that stick creep by a twentieth of it in a lift."""
-IDLE = 1e-3
-"""Normal force at rest, relative to the largest, below which a fingertip does not push."""
 FULL_LOAD = 0.999
 """Share of the load above which it is all there."""
 
@@ -344,7 +343,8 @@ def _on_cone(
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Return which contacts push at rest, (k,), and when those slip or are open, (n, pushing)."""
     rest_n = pushes[begun, :, 0]
-    pushing = rest_n > IDLE * rest_n.max()  # a fingertip that pushes at nothing cannot slip
+    # a fingertip that pushes at nothing cannot slip
+    pushing = rest_n > LEAST_PUSHING * rest_n.max()
     forces = pushes[:, pushing]
     across = np.linalg.norm(forces[..., 1:], axis=2)
     on_cone = across >= ON_CONE * friction[pushing] * forces[..., 0]

@@ -27,6 +27,7 @@ from sim_validate.hands.controls import (
 )
 from sim_validate.hands.known_hand import KnownHand
 from sim_validate.hands.verdict import HandVerdict
+from sim_validate.settings import USUAL_FRICTION
 
 MOST_PUSH_N = 100.0
 """Largest normal force of a fingertip unless stated [N]: more than hands' motors give."""
@@ -39,7 +40,7 @@ def hand_setup() -> Setup:
 
 
 def validate_hand(
-    hand: Hand, body: Polyhedron, reach: HandReach, friction: float = 0.5, *,
+    hand: Hand, body: Polyhedron, reach: HandReach, friction: float = USUAL_FRICTION, *,
     down: tuple[float, float, float] | None = None,
     agenda: Agenda | None = None, setup: Setup | None = None,
 ) -> HandVerdict:  # fmt: skip

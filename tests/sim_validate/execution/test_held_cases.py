@@ -25,7 +25,7 @@ def held_case(mass_kg, stiffness_n_per_m, radius_m, **more):
     } | more  # fmt: skip
     case = HeldCase(mass_kg, stiffness_n_per_m, radius_m=radius_m, **fields)
     if case.physics is None:
-        own = case.held_box().physics
+        own = case.held_scene().physics
         case = held_case(mass_kg, stiffness_n_per_m, radius_m, **(more | {"physics": own}))
     return case
 
@@ -132,7 +132,7 @@ def test_no_grasp_is_executed_with_broken_settings():
 
 def test_settings_are_measured_once_whatever_the_direction_of_gravity():
     case = held_case(*USUAL)
-    scene = case.held_box()
+    scene = case.held_scene()
     hand = HeldSettings(down=(1.0, 0.0, 0.0))
     (first,) = cases_of(scene.layout, scene.physics, HeldSettings(), 10.0)
     turned = replace(scene.physics, gravity=tuple(gravity_of(hand).tolist()))
@@ -142,7 +142,7 @@ def test_settings_are_measured_once_whatever_the_direction_of_gravity():
 
 
 def test_each_friction_of_a_scene_is_measured():
-    scene = held_case(*USUAL).held_box()
+    scene = held_case(*USUAL).held_scene()
     layout = replace(scene.layout, friction=np.array([0.3, 0.3, 0.6, 0.301]))
     cases = cases_of(layout, scene.physics, HeldSettings(), 10.0)
     assert [case.friction for case in cases] == [0.3, 0.6]
