@@ -22,7 +22,7 @@ With mu the friction and N the normal force of a contact:
 
 The loads and frictions at which the boxes slip are found and judged as those of grasps are, by
 holds, ramps and releases, but every trial has its full length: that trials of grasps may end early
-presumes that nothing slips later (`held_or_let_go`). So thresholds too loose to notice a slip are
+presumes that nothing slips later (`early_ends`). So thresholds too loose to notice a slip are
 refused, like settings that slip falsely. The cases have the friction and the size of the object
 under test.
 

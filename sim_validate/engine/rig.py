@@ -13,7 +13,8 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from scenes.mujoco.closure_scene import Layout, Scene
-from sim_validate.engine.held_or_let_go import EarlyEnds, Trace, traces
+from sim_validate.engine.early_ends import EarlyEnds
+from sim_validate.engine.held_or_let_go import Trace, traces
 from sim_validate.engine.schedules import Schedule, Thresholds, TrialLoad, samples, smooth
 from sim_validate.engine.setup import Setup
 from sim_validate.engine.stepping import Bench, Motion
@@ -48,7 +49,7 @@ class Rig:
     """Whether the object also settled in that motion, so that friction may be lowered at once."""
     whole: bool = False
     """Whether all trials have the protocols' full length; else each ends as soon as its answer is
-    known (see `held_or_let_go`)."""
+    known (see `early_ends`)."""
 
     def holds(
         self, loads: Sequence[TrialLoad], settling_frictions: Sequence[float] | None = None

@@ -11,7 +11,8 @@ import pytest
 
 import grasp_core as gc
 from sim_validate.closure.controls import control_case, negative_controls
-from sim_validate.engine.held_or_let_go import LEAST_WATCHED_SAMPLES, USABLE, EarlyEnds, judge
+from sim_validate.engine.early_ends import LEAST_WATCHED_SAMPLES, USABLE, EarlyEnds
+from sim_validate.engine.held_or_let_go import judge
 from sim_validate.engine.planned_loads import LoadPlanner
 from sim_validate.engine.rig import squeezed
 from sim_validate.engine.schedules import Thresholds, part
