@@ -52,7 +52,7 @@ from sim_validate.closure.replaying import Recorded, replayed
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.execution.confirming import run_trials
 from sim_validate.execution.execute import SpringFingers
-from sim_validate.execution.predictions import planned
+from sim_validate.execution.holders import planned
 from sim_validate.execution.simulate import HeldBench
 from sim_validate.report.charts import (
     Agreement,

@@ -45,7 +45,8 @@ from sim_validate.datasets.config import DatasetConfig, Learning
 from sim_validate.datasets.parquet import RowCells
 from sim_validate.engine.misplacement import draws_by_name
 from sim_validate.engine.setup import Agenda, Setup
-from sim_validate.execution.execute import execute, tip_radius
+from sim_validate.execution.execute import execute
+from sim_validate.execution.holders import tip_radius
 from sim_validate.execution.verdict import ExecutedGrasp, ExecutionTrial
 from sim_validate.settings import TrialKind
 

@@ -51,7 +51,7 @@ from sim_validate.datasets.making_rows import PLANNED_KIND
 from sim_validate.datasets.open_dataset import Dataset
 from sim_validate.datasets.parquet import agrees
 from sim_validate.engine.held_or_let_go import Outcome
-from sim_validate.execution.execute import tip_radius
+from sim_validate.execution.holders import tip_radius
 from sim_validate.execution.verdict import ExecutionTrial
 
 ON_MESH, NEAR_MESH = 1e-5, 0.05

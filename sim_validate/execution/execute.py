@@ -16,21 +16,19 @@ from annotated_types import Interval
 from numpy.typing import ArrayLike
 
 from grasp_core.allowed_values import instance, value_of
-from grasp_core.closure.contacts import contact_arrays, contacts_sha256, listed_contacts, stacked
+from grasp_core.closure.contacts import contacts_sha256, listed_contacts
 from grasp_core.errors import NoForcesError
-from grasp_core.execution.grips import Grip, unsqueezed
 from grasp_core.execution.squeeze_certificate import BestSqueeze
 from grasp_core.objects.on_faces import check_body, check_on_faces, edge_distance, face_under
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
-from scenes.mujoco.fingertip_room import fitting_radius
-from scenes.mujoco.held_scene import HeldScene, build_held_scene
 from scenes.mujoco_options import PhysicsSettings
 from sim_validate.engine.known_cases import checked
 from sim_validate.engine.setup import MOST_THREADS
 from sim_validate.execution.confirming import confirmed_trials, with_first_slips
+from sim_validate.execution.enough import NoSqueezeError, found_enough
 from sim_validate.execution.held_cases import cases_of
-from sim_validate.execution.predictions import Holder, NoSqueezeError, found_enough, planned
+from sim_validate.execution.holders import Holder, SpringFingers, planned
 from sim_validate.execution.simulate import HeldBench
 from sim_validate.execution.trials import run_controls
 from sim_validate.execution.verdict import ExecutedGrasp, Execution
@@ -120,36 +118,6 @@ def _chosen_squeeze(holder: Holder, settings: ExecutionSettings, *, enough: bool
         raise NoSqueezeError(str(error), found_enough(holder, settings)) from error
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class SpringFingers(Holder):
-    """Fingertips on springs, which hold an object by contacts."""
-
-    contacts: Sequence[Contact]
-    friction: ArrayLike
-    physics: PhysicsSettings | Mapping[str, Any] | None = None
-    """Settings of the simulator, or those of the usual ones that differ, by name; None for the
-    usual ones."""
-
-    def loose(self, settings: ExecutionSettings) -> tuple[Grip, None]:
-        """Return the contacts before they are squeezed; no motors limit fingertips."""
-        stiffness = settings.tip_stiffness_n_per_m
-        radius = tip_radius(self.body, self.contacts, settings)
-        return unsqueezed(
-            self.body, self.contacts, self.friction, stiffness=stiffness, tip_radius_m=radius
-        ), None
-
-    def scene(self, settings: ExecutionSettings, best: BestSqueeze) -> HeldScene:
-        """Build the scene in which a squeeze is executed."""
-        build = partial(
-            build_held_scene, self.body, best.grip, settings,
-            reach_m=self.reach_m(settings, best.grip),
-        )  # fmt: skip
-        if not isinstance(self.physics, Mapping):
-            return build(physics=self.physics)
-        usual = build()
-        return build(physics=replace(usual.physics, **self.physics)) if self.physics else usual
-
-
 def over_edges(bench: HeldBench, body: Polyhedron) -> tuple[int, ...]:
     """Return contacts nearer to an edge than the dent of their squeezed fingertip is wide.
 
@@ -176,13 +144,6 @@ def given_contacts(body: Polyhedron, grasp: Grasp | Iterable[Contact]) -> tuple[
         return listed_contacts(grasp, "grasp")
     check_on_faces(body, grasp)
     return grasp.contacts
-
-
-def tip_radius(body: Polyhedron, contacts: Sequence[Contact], settings: ExecutionSettings) -> float:
-    """Return the radius of the fingertips [m]: as in the settings, or one that fits."""
-    if settings.tip_radius_m is not None:
-        return settings.tip_radius_m
-    return fitting_radius(body, *contact_arrays(*stacked(contacts)))
 
 
 @dataclass(frozen=True, slots=True)

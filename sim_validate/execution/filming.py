@@ -9,7 +9,7 @@ from scenes.drawing.clips import RATE, write_held_clip
 from scenes.settings import SAMPLE_S
 from sim_validate.execution.confirming import run_trials
 from sim_validate.execution.execute import ExecutionJob
-from sim_validate.execution.predictions import planned
+from sim_validate.execution.holders import planned
 from sim_validate.execution.simulate import HeldBench
 from sim_validate.execution.verdict import Execution, ExecutionTrial
 

@@ -29,44 +29,26 @@ A slip is not yet a loss. The object is predicted to be lost at the least multip
 what is allowed, or at which the steady load with the x of the sample of first slip carries the
 object away once contacts slip (see `beyond_slip`). A load that turns all the time makes contacts
 slip in every round, and then the first slip counts instead.
-
-Predictions also say what is enough. The trials ask a squeeze to carry the weight and their largest
-acceleration a in any direction: the loads of `any_direction(mass, a)`, a multiple 1 + a / g of the
-weight. `best_squeeze` finds the least push that does, where the fingertips are stiff enough for the
-grip to be stable and for the object to stay within what counts as held under all these loads. That
-is the linear model of slow loads. Springs overshoot, and knocks and shakes about an axis bring
-torques, so the motion of the held object in each trial is predicted as well. If it predicts a loss,
-more is asked: a larger multiple where contacts slip before, and stiffer fingertips where the object
-moves too far.
 """
 
 import importlib
 import math
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from grasp_core.arrays import Array, cross
 from grasp_core.closure.contacts import WRENCH, cross_matrix
-from grasp_core.errors import InputError, NoForcesError, SolverError
-from grasp_core.execution.best_squeeze import searched
 from grasp_core.execution.beyond_slip import loss_multiples
 from grasp_core.execution.first_slip import slip_steps
 from grasp_core.execution.grips import Grip
-from grasp_core.execution.loads import GRAVITY_M_PER_S2, LoadSet, any_direction
-from grasp_core.execution.squeeze_certificate import BestSqueeze
-from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.quality.motors import Motors
 from grasp_core.solvers.ties import first_best
-from scenes.mujoco.held_scene import SAMPLE_S, HeldLayout, HeldScene, gravity_of
+from scenes.mujoco.held_scene import SAMPLE_S, HeldLayout
 from scenes.mujoco.mjcf_text import rotations
-from sim_validate.execution import paths
 from sim_validate.execution.paths import TrialDrive
-from sim_validate.execution.trials import Trial, trials_of
-from sim_validate.execution.verdict import Enough, Skipped
+from sim_validate.execution.trials import Trial
 from sim_validate.settings import ExecutionSettings
 
 
@@ -194,180 +176,3 @@ class HeldDynamics:
         motion, speed = states[..., :WRENCH], states[..., WRENCH:]
         acceleration = loads @ inverse.T - motion @ stiff.T - speed @ damp.T
         return np.stack([motion, speed, acceleration])[..., None, :, None]
-
-
-NO_LOSS = 1.1
-"""Predicted loss of the trials that is asked for: predictions beyond a slip are not exact."""
-MOST_ASKED = 8
-"""Most times that more is asked; two are usual."""
-FINE_RATIO = 1.05
-"""Ratio of a stiffness that is enough to one that is not, at which the search for it ends."""
-FIRM = 1e4
-"""Stiffness at which no squeeze makes a grip unstable, in loads over the object's radius."""
-ROUNDED_BY = 1.005
-"""Factor by which numbers are at least what they were when they are rounded to three digits."""
-
-
-class NoSqueezeError(NoForcesError):
-    """Raised where no squeeze executes a grasp; it knows what would be enough."""
-
-    def __init__(self, reason: str, enough: Enough | None = None) -> None:
-        super().__init__(reason if enough is None else f"{reason}; {enough}")
-        self.enough = enough
-
-
-SURFACE_SPARE = 0.05
-"""How much farther a curved surface is there than fingertips come, in object radii."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Holder(ABC):
-    """What holds the object in an execution: fingertips on springs, or a hand."""
-
-    body: Polyhedron
-
-    @abstractmethod
-    def loose(self, settings: ExecutionSettings) -> tuple[Grip, Motors | None]:
-        """Return the contacts before they are squeezed, and the motors behind them."""
-
-    @abstractmethod
-    def scene(self, settings: ExecutionSettings, best: BestSqueeze) -> HeldScene:
-        """Build the scene in which a squeeze is executed."""
-
-    def squeeze(self, settings: ExecutionSettings, loads: LoadSet | None = None) -> BestSqueeze:
-        """Choose the squeeze of most weight in any direction, or of least push for given loads."""
-        start, motors = self.loose(settings)
-        most = settings.push_n if loads is None else None
-        best = searched(start, loads or any_direction(settings.object_kg), most, motors)
-        if best.scale == 0.0:
-            within = "" if motors is None else " within the motors' torques"
-            others = "other contacts" if motors is None else "stronger motors, another pose,"
-            raise NoForcesError(
-                f"no squeeze{within} carries any part of the weight in every direction; use "
-                f"{others} or more friction"
-            )
-        return best
-
-    def reach_m(self, settings: ExecutionSettings, grip: Grip) -> float | None:
-        """Return how far tips come from contacts on a curved surface [m]; None for flat ones."""
-        if self.body.patches is None:
-            return None
-        turn = settings.most_rad + math.radians(settings.off_deg)
-        moved = settings.most_m + settings.off_mm / 1000.0
-        return moved + (turn + SURFACE_SPARE) * self.body.radius + float(grip.tip_radius_m.max())
-
-
-def planned(
-    holder: Holder, settings: ExecutionSettings, best: BestSqueeze
-) -> tuple[HeldScene, HeldDynamics, tuple[Trial, ...], tuple[Skipped, ...]]:
-    """Plan an execution: its scene and dynamics, its trials, and those that are left out."""
-    scene = holder.scene(settings, best)
-    dynamics = HeldDynamics(best.grip, scene.layout)
-    trials = trials_of(holder.body, scene.layout, settings, dynamics.lowest_frequency)
-    return scene, dynamics, *trials
-
-
-def found_enough(holder: Holder, settings: ExecutionSettings) -> Enough:
-    """Find the least push, and stiffness, that is enough for the trials of an execution."""
-    kinds = ("shake along" if kind == "shake" else kind for kind in settings.trials)
-    multiple = 1.0 + max(accelerations_g(settings)[kind] for kind in kinds)
-    stiffness = settings.tip_stiffness_n_per_m
-    weight_n = settings.object_kg * GRAVITY_M_PER_S2
-    firm = FIRM * multiple * weight_n / holder.body.radius + stiffness
-    try:  # what no push on firm fingertips survives, no push survives
-        _least(holder, settings, firm, multiple)
-    except NoForcesError as error:
-        return Enough(multiple, reason=f"it is proved that {error}")
-    except (InputError, SolverError) as error:
-        return Enough(multiple, reason=str(error))
-    found = None
-    for _ in range(MOST_ASKED):
-        own = _stiff_enough(holder, settings, (stiffness, firm), multiple)
-        if own is None:
-            break
-        best = holder.squeeze(own)
-        slip, loss = _predicted(holder, own, best)
-        found = Enough(best.scale, own.push_n, own.tip_stiffness_n_per_m, loss)
-        if loss >= NO_LOSS:
-            break
-        more, stiffness = FINE_RATIO * NO_LOSS / max(loss, 0.5), own.tip_stiffness_n_per_m
-        if slip > loss:
-            stiffness *= more
-        else:
-            multiple *= more
-    return found or Enough(multiple, reason="no stiffness of the fingertips is enough")
-
-
-def accelerations_g(settings: ExecutionSettings) -> dict[str, float]:
-    """Compute the largest acceleration of each kind of trial, in units of gravity."""
-    gravity, way = gravity_of(settings), np.array([1.0, 0.0, 0.0])
-    stop = paths.stop(gravity, way, settings.stop_m_per_s2, settings.stop_from_m_per_s)
-    lift, _ = paths.lift(way, settings.lift_m, settings.lift_s)
-    knock = paths.knock(gravity, settings.impulse_n_s * way, np.zeros(3))
-    return {
-        **dict.fromkeys(("weight", "misplaced"), 0.0),
-        **dict.fromkeys(("shake along", "shake about"), settings.shake_g),
-        "lift": _largest(lift.accelerations),
-        "stop": _largest(stop.accelerations),
-        # of an object that nothing holds
-        "knock": _largest(knock.wrenches) / settings.object_kg,
-    }
-
-
-def _largest(values: Array) -> float:
-    return float(np.linalg.norm(values[:, :3], axis=1).max()) / GRAVITY_M_PER_S2
-
-
-def _least(
-    holder: Holder, settings: ExecutionSettings, stiffness: float, multiple: float
-) -> tuple[ExecutionSettings, BestSqueeze]:
-    """Find the squeeze of least push for a multiple of the weight, and settings with that push."""
-    given = stiffness == settings.tip_stiffness_n_per_m
-    own = replace(settings, tip_stiffness_n_per_m=stiffness if given else _rounded_up(stiffness))
-    loads = any_direction(own.object_kg, (multiple - 1.0) * GRAVITY_M_PER_S2)
-    best = holder.squeeze(own, loads)
-    return replace(own, push_n=_rounded_up(best.max_push_n)), best
-
-
-def _stiff_enough(
-    holder: Holder, settings: ExecutionSettings, ends: tuple[float, float], multiple: float
-) -> ExecutionSettings | None:
-    """Return the settings with the least stiffness between two that is enough, and its push."""
-
-    def tried(stiffness: float) -> ExecutionSettings | None:
-        try:
-            own, best = _least(holder, settings, stiffness, multiple)
-            holder.squeeze(own)  # refused where rounding makes the grip unstable
-        except (InputError, NoForcesError, SolverError):
-            return None
-        # the farthest that the loads move and turn the object
-        moves = np.linalg.solve(best.grip.grasp_stiffness, best.loads.axes)
-        moved, turned = (float(np.linalg.norm(part, 2)) for part in (moves[:3], moves[3:]))
-        return own if moved <= own.most_m and turned <= own.most_rad else None
-
-    low, high = ends
-    if (found := tried(low)) is not None:
-        return found
-    found = tried(high)
-    while found is not None and high > FINE_RATIO * low:
-        middle = math.sqrt(low * high)
-        if (better := tried(middle)) is None:
-            low = middle
-        else:
-            found, high = better, middle
-    return found
-
-
-def _predicted(
-    holder: Holder, settings: ExecutionSettings, best: BestSqueeze
-) -> tuple[float, float]:
-    # all misplacements have the prediction of the weight
-    _, dynamics, trials, _ = planned(holder, replace(settings, misplacements=1), best)
-    found = dynamics.losses(trials, settings)
-    if not found:
-        return math.inf, math.inf
-    return found[first_best([-loss for _, loss in found])]
-
-
-def _rounded_up(value: float) -> float:
-    return float(f"{ROUNDED_BY * value:.3g}")

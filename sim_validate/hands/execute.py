@@ -27,7 +27,7 @@ from scenes.mujoco.hand_scenes import (
 )
 from scenes.mujoco.held_scene import HeldScene
 from sim_validate.execution.execute import execution_of, result_of
-from sim_validate.execution.predictions import Holder
+from sim_validate.execution.holders import Holder
 from sim_validate.execution.verdict import ExecutedGrasp, Execution
 from sim_validate.hands.validate import MOST_PUSH_N, closed_stance
 from sim_validate.settings import ExecutionSettings

@@ -6,8 +6,8 @@ import pytest
 
 import grasp_core as gc
 import sim_validate as sv
+from sim_validate.execution.enough import NO_LOSS, NoSqueezeError
 from sim_validate.execution.execute import SpringFingers
-from sim_validate.execution.predictions import NO_LOSS, NoSqueezeError
 from sim_validate.execution.verdict import losses_in_words
 from sim_validate.hands.execute import hand_execution_settings
 from tests.grasp_core.execution.held import box
