@@ -15,12 +15,14 @@ from grasp_core.processes import receive, send, unpacked
 from scenes.example_objects import example_object
 from tests.patience import HANGING_S
 
+COMPLETE = gc.PlanSettings(0.3, complete=True)
+
 
 @pytest.mark.parametrize(
     ("name", "keywords"),
     [
         ("random-7-7", {}),
-        pytest.param("prism", {"complete": True, "friction": 0.3}, marks=pytest.mark.slow),
+        pytest.param("prism", {"settings": COMPLETE}, marks=pytest.mark.slow),
         pytest.param("octahedron", {"limit": 5, "rank_by": "diverse"}, marks=pytest.mark.slow),
     ],
 )

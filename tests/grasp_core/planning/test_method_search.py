@@ -30,7 +30,9 @@ CASES = {
 
 
 def radii(body, options, family, limit):
-    plan = gc.plan(body, **{"friction": 0.3, **options}, families=family, limit=limit)
+    chosen = {"friction": 0.3, **options, "families": (family,), "limit": limit}
+    finger = chosen.pop("finger", None)
+    plan = gc.plan(body, settings=gc.PlanSettings(**chosen), finger=finger)
     return [grasp.radius / body.radius for grasp in plan.grasps]
 
 
