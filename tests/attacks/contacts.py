@@ -10,7 +10,7 @@ from functools import cache
 import numpy as np
 
 import grasp_core as gc
-from grasp_core.closure import force_closure as closure
+from grasp_core.closure import closure_certificate as closure
 from grasp_core.closure import friction_interval
 from tests.attacks.searching import Attack, power, tiny
 from tests.grasp_core.exact_judges import closed_exactly, open_exactly
@@ -145,7 +145,7 @@ def too_large_a_soft_margin(rng):
 
 SOFT = Attack(
     (soft_though_open, too_large_a_soft_margin),
-    (lambda monkeypatch: monkeypatch.setattr(closure, "_lower_bound", lambda *_: math.inf),),
+    (lambda monkeypatch: monkeypatch.setattr(closure, "lower_bound", lambda *_: math.inf),),
     1500,
 )  # fmt: skip
 
