@@ -12,9 +12,9 @@ from pathlib import Path
 ROOT = Path(__file__).parent.parent
 PACKAGES = ("grasp_core", "scenes", "sim_validate")
 TOTALS = {
-    "lines of packages": 60_548,
+    "lines of packages": 60_554,
     "modules of packages": 300,
-    "lines of tests": 40_884,
+    "lines of tests": 40_891,
     "lines of docs": 3_981,
 }
 """Most that there may be. Who merges lowers a number to what the command prints. A number rises

@@ -84,9 +84,9 @@ SAME_OFFSET = 1e-9
 NO_BOUND = 1e-12
 """Size of a facet's component along N below which the facet does not bound z / x: it allows every
 value or none."""
-GIVEN_UP = 1e-9
+GIVEN_UP = (1e-9, 1e-8, 1e-7)
 """Offset given up in favour of the least variables: giving up less makes the contacts of two
-pairings differ from each other's."""
+pairings differ from each other's. The next is tried where rounding leaves no room in one."""
 
 
 class PairFrames(NamedTuple):
@@ -228,9 +228,11 @@ def place(faces: FaceTable, attempts: Attempts, placed: Placed) -> None:
         frames = pair_frames(fingers)
         best, slopes, side = _best_choice(fingers, frames, -SAME_OFFSET)
         placed.ends[a] = NOTHING_HELD if best == -np.inf else NOT_DECIDED
-        if abs(best) < np.inf and _nearest_optimum(fingers, frames, slopes, side, best, x):
-            _take(fingers, frames, slopes, a, x, placed)
-            placed.ends[a], placed.merits[a] = CONTACTS_PLACED, best
+        for sign in (side, -side):  # the bound holds; rounding may have told the side falsely
+            undecided = placed.ends[a] == NOT_DECIDED and abs(best) < np.inf
+            if undecided and _nearest_optimum(fingers, frames, slopes, sign, best, x):
+                _take(fingers, frames, slopes, a, x, placed)
+                placed.ends[a], placed.merits[a] = CONTACTS_PLACED, best
 
 
 @loop()
@@ -267,9 +269,13 @@ def _nearest_optimum(
         b[k] = sign * rows.b[row]
         for j in range(REGULUS_VARIABLES):
             A[k, j] = sign * rows.At[j, row]
-    A[-1, T], b[-1] = 1.0, GIVEN_UP * (1.0 + abs(best)) - best
-    unmet, excess = nearest(A, b, x)
-    return unmet <= CONDITIONS_MET and excess <= FEASIBLE
+    A[-1, T] = 1.0
+    for given_up in GIVEN_UP:
+        b[-1] = given_up * (1.0 + abs(best)) - best
+        unmet, excess = nearest(A, b, x)
+        if unmet <= CONDITIONS_MET and excess <= FEASIBLE:
+            return True
+    return False
 
 
 @loop(once=True)
