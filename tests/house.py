@@ -14,7 +14,7 @@ PACKAGES = ("grasp_core", "scenes", "sim_validate")
 TOTALS = {
     "lines of packages": 60_554,
     "modules of packages": 300,
-    "lines of tests": 40_891,
+    "lines of tests": 40_892,
     "lines of docs": 3_981,
 }
 """Most that there may be. Who merges lowers a number to what the command prints. A number rises

@@ -97,4 +97,5 @@ def test_the_merit_is_the_optimum_of_plain_rows():
 def test_a_turned_object_keeps_a_regulus_whose_side_rounding_told_falsely():
     name, friction = chosen(27)
     expected = found_on(example_object(name), friction)
+    assert (0, 2, 4, 7, "regulus") in expected
     assert examine((27, expected)) == (name, friction, len(expected), [])
