@@ -9,6 +9,7 @@ above it. The whole triangle is then within 3 d of the hull's border.
 import hashlib
 import importlib
 from dataclasses import field
+from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, Self, TypeVar
 
@@ -250,6 +251,7 @@ TRIANGLES_AT_ONCE = 256
 """Number of triangles compared with all facets at a time, which needs a few megabytes."""
 
 
+@lru_cache(maxsize=16)
 def is_convex(body: Polyhedron) -> bool:
     """Return whether all triangles of an object lie on the surface of their convex hull."""
     spatial: Any = importlib.import_module("scipy.spatial")

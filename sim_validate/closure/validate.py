@@ -47,7 +47,8 @@ from sim_validate.closure.verdict import (
 )
 from sim_validate.engine.closure_cases import ClosureCase
 from sim_validate.engine.held_or_let_go import LET_GO, HoldVerdict, Outcome, judge
-from sim_validate.engine.known_cases import Gate, checked, untouching
+from sim_validate.engine.kept_gates import checked
+from sim_validate.engine.known_cases import Gate, untouching
 from sim_validate.engine.misplacement import Disturbed, disturbed
 from sim_validate.engine.planned_loads import LoadPlanner, PlannedLoad
 from sim_validate.engine.rig import Rig, closed_on

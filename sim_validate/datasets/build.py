@@ -17,7 +17,7 @@ from sim_validate.datasets.resuming import Staging
 from sim_validate.datasets.work_units import WorkUnit, units_of, units_sha256
 from sim_validate.datasets.writing import write_card_and_manifest, write_rows
 from sim_validate.engine.closure_cases import ClosureCase
-from sim_validate.engine.known_cases import checked
+from sim_validate.engine.kept_gates import checked
 from sim_validate.engine.setup import Setup
 from sim_validate.files.locks import entries
 from sim_validate.files.output_folders import alone_in

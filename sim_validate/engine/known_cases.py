@@ -17,7 +17,6 @@ from pydantic import computed_field
 from grasp_core.allowed_values import Measured, OrInfinity
 from grasp_core.arrays import Array
 from grasp_core.declared import Declared, declared
-from grasp_core.errors import UnfaithfulError
 from grasp_core.messages import MILLI
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
@@ -74,18 +73,6 @@ class KnownCase(Protocol):
 def measured(case: KnownCase) -> Gate:
     """Measure the simulator on a known case, once per process for the same settings."""
     return Gate(case.checks(), versions()["mujoco"])
-
-
-def checked(case: KnownCase) -> Gate:
-    """Check the simulator on a known case, and refuse settings under which a check fails."""
-    gate = measured(case)
-    if not gate.passed:
-        failed = "; ".join(str(check) for check in gate.checks if not check.passed)
-        raise UnfaithfulError(
-            "the simulator is not faithful with these settings, so nothing is simulated with them; "
-            f"these checks failed: {failed}"
-        )
-    return gate
 
 
 def two_digits(value: float) -> float:

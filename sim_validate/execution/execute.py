@@ -23,7 +23,7 @@ from grasp_core.objects.on_faces import check_body, check_on_faces, edge_distanc
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
 from scenes.mujoco_options import PhysicsSettings
-from sim_validate.engine.known_cases import checked
+from sim_validate.engine.kept_gates import checked
 from sim_validate.engine.setup import MOST_THREADS
 from sim_validate.execution.confirming import confirmed_trials, with_first_slips
 from sim_validate.execution.enough import NoSqueezeError, found_enough

@@ -16,7 +16,7 @@ from scenes.mujoco.hand_scenes import build_hand_scene, hand_physics
 from scenes.settings import FingerSettings
 from sim_validate.closure.validate import held_wrenches
 from sim_validate.engine.closure_cases import ClosureCase
-from sim_validate.engine.known_cases import checked
+from sim_validate.engine.kept_gates import checked
 from sim_validate.engine.rig import closed_on
 from sim_validate.engine.setup import WEAKEST, Agenda, Setup
 from sim_validate.hands.controls import (

@@ -38,7 +38,8 @@ from scenes.mujoco.mjcf_text import IDENTITY_POSE
 from scenes.mujoco.published_tests import TestedObject, TestedScene
 from sim_validate.engine.closure_cases import ClosureCase
 from sim_validate.engine.held_or_let_go import Outcome, judge, rotation_angles
-from sim_validate.engine.known_cases import checked, untouching
+from sim_validate.engine.kept_gates import checked
+from sim_validate.engine.known_cases import untouching
 from sim_validate.engine.planned_loads import LoadPlanner
 from sim_validate.engine.rig import closed_on
 from sim_validate.engine.schedules import samples

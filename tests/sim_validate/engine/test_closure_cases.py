@@ -10,7 +10,8 @@ import scenes
 import sim_validate as sv
 from scenes.mujoco_options import PhysicsSettings
 from sim_validate.engine.closure_cases import ClosureCase
-from sim_validate.engine.known_cases import checked, measured, untouching
+from sim_validate.engine.kept_gates import checked
+from sim_validate.engine.known_cases import measured, untouching
 from sim_validate.engine.setup import Setup
 from sim_validate.engine.stepping import Bench
 from tests.sim_validate.rigs import grasps
@@ -53,8 +54,10 @@ def setup_of(table, numbers):
 
 def test_the_usual_settings_are_faithful_and_every_figure_is_measured():
     """On the object, how fingertips touch its faces is measured too."""
-    gate = checked(ClosureCase.of(Setup(), 0.5, BODY.radius))
+    case = ClosureCase.of(Setup(), 0.5, BODY.radius)
+    gate = checked(case)
     assert gate.passed
+    assert gate == measured(case)  # although it may come from a file
     assert len(gate.checks) == 21
     for check in gate.checks:
         assert check.least <= check.value < check.largest
@@ -62,7 +65,7 @@ def test_the_usual_settings_are_faithful_and_every_figure_is_measured():
     assert len(checked(ClosureCase.of(Setup(surface="pads"), 0.5, BODY.radius)).checks) == 19
     fingers = scenes.FingerSettings(fingertip_radius_m=0.01)
     other = Setup(surface="object", threads=2, timeout_s=5.0, fingers=fingers)
-    assert measured(ClosureCase.of(other, 0.5, BODY.radius)) is gate  # it is measured once
+    assert checked(ClosureCase.of(other, 0.5, BODY.radius)) is gate  # it is looked up once
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,8 @@ import grasp_core as gc
 import sim_validate as sv
 from scenes.mujoco_options import PhysicsSettings
 from sim_validate.engine.closure_cases import ClosureCase
-from sim_validate.engine.known_cases import checked, measured
+from sim_validate.engine.kept_gates import checked
+from sim_validate.engine.known_cases import measured
 from sim_validate.engine.setup import Agenda, Setup
 from tests.sim_validate.rigs import grasps
 
