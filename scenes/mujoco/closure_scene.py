@@ -24,12 +24,11 @@ from typing import TYPE_CHECKING, Any, Self, get_args
 import numpy as np
 
 from grasp_core.allowed_values import Friction, instance, number, one_of, path_of, value_of
-from grasp_core.arrays import Array, rounded, to_digits
-from grasp_core.closure.contacts import contact_frames, listed_contacts, unit_size
-from grasp_core.closure.decision import deepest_forces
+from grasp_core.arrays import Array, frozen, rounded, to_digits
+from grasp_core.closure.contacts import contact_frames, listed_contacts
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.declared import Declared, declared
-from grasp_core.errors import UndecidedError
+from grasp_core.errors import InputError, UndecidedError
 from grasp_core.files.text_files import write_parts
 from grasp_core.notebooks import InNotebooks
 from grasp_core.objects.on_faces import check_body, face_under
@@ -80,9 +79,6 @@ PAD_TOUCH = 1e-9
 """Least depth of fingertips in pads at the start, in grasp sizes. At depth zero, rounding would
 decide which fingertips press in the first step, and the impact of the others one step later can
 tilt lightly held objects by 1e-4."""
-OPEN_MARGIN = -1e-6
-"""Margin of closure below which contacts count as open without a proof. It is far beyond the errors
-of compiled code; the worst that could happen is a squeeze along the normals."""
 RETREAT = 0.5
 """Distance from which fingers approach, in grasp sizes; from much farther away they would arrive
 too fast."""
@@ -162,6 +158,7 @@ def build_scene(
     fingers: FingerSettings | None = None,
     physics: PhysicsSettings | None = None,
     surface: SurfaceChoice | None = None,
+    squeeze: Array | None = None,
 ) -> Scene:
     """Make a MuJoCo scene from an object and a grasp.
 
@@ -173,6 +170,8 @@ def build_scene(
         physics: Simulation settings.
         surface: What fingertips touch, the object's own surface or pads at the contacts; None for
             pads where the faces are patches of a curved surface, else for the object.
+        squeeze: Proportions of the forces of a gentle grasp, each pushing, (k, 3); None for
+            balanced ones where the contacts are in force closure, else for even pushes.
 
     Raises:
         InputError: A number is out of range.
@@ -185,7 +184,7 @@ def build_scene(
     physics = PhysicsSettings() if physics is None else physics
     instance(physics, PhysicsSettings, "physics")
     contacts = grasp if isinstance(grasp, Grasp) else listed_contacts(grasp, "grasp")
-    layout = arrange(body, contacts, friction, fingers, physics, surface)
+    layout = arrange(body, contacts, friction, fingers, physics, surface, squeeze)
     return Scene(to_text(layout, physics), layout, physics)
 
 
@@ -258,7 +257,7 @@ def surface_of(body: Polyhedron) -> SurfaceChoice:
 def arrange(
     body: Polyhedron, grasp: Grasp | Sequence[Contact], friction: float,
     fingers: FingerSettings | None = None, softness: Softness = HARD_TIPS,
-    surface: SurfaceChoice | None = None,
+    surface: SurfaceChoice | None = None, squeeze: Array | None = None,
 ) -> Layout:  # fmt: skip
     """Place object, fingertips and drives for a grasp.
 
@@ -282,6 +281,11 @@ def arrange(
     largest = fingers.max_normal_force_n
     mass = largest * RESPONSE_TIME_S**2 / size
     frames = contact_frames(normals)
+    if squeeze is None:
+        squeeze = _balanced(positions, normals, friction, softness)
+    pushes = np.einsum("kij,ki->kj", frames, frozen(squeeze, positions.shape, "squeeze"))
+    if not pushes[:, 0].max() > 0.0:
+        raise InputError("squeeze: at least one contact must push into the object, got none")
     return Layout(
         name=body.name,
         vertices=to_digits(body.vertices - body.center_of_mass),
@@ -300,7 +304,7 @@ def arrange(
         friction=friction,
         drive=drive,
         holder=_slides(arms, frames, drive),
-        squeeze=GENTLE_SQUEEZE * largest * _pushes(positions, normals, friction, softness),
+        squeeze=GENTLE_SQUEEZE * largest * to_digits(pushes / pushes[:, 0].max()),
         approach=to_digits(-RETREAT * size * _ways_in(grasp, normals, fingers)),
         softness=softness,
         on_pads=on_pads,
@@ -376,18 +380,10 @@ def _inertia(mass: float, positions: Array, size: float) -> Array:
     return to_digits(0.25 * mass * (axes * levers) @ axes.T)
 
 
-def _pushes(positions: Array, normals: Array, friction: float, softness: Softness) -> Array:
-    """Compute balanced forces, (k, 3), or normal ones without closure; the largest push is one."""
-    arms, _, _ = unit_size(positions)
-    _, _, margins = deepest_forces(arms[None], normals[None], np.array([friction]))
+def _balanced(positions: Array, normals: Array, friction: float, softness: Softness) -> Array:
+    """Find forces (k, 3) that balance, or else pushes along the normals where none are proved."""
     try:
-        # a proof takes long, and is not needed where hard fingers are open by far
-        hopeless = margins[0, 1] < OPEN_MARGIN and not softness.is_soft
-        forces = None
-        if not hopeless:
-            soft = softness.torsion_m
-            forces = force_closure(positions, normals, friction, torsion_m=soft).forces
+        found = force_closure(positions, normals, friction, torsion_m=softness.torsion_m).forces
     except UndecidedError:
-        forces = None
-    local = np.einsum("kij,ki->kj", contact_frames(normals), normals if forces is None else forces)
-    return to_digits(local / local[:, 0].max())
+        found = None
+    return normals if found is None else found

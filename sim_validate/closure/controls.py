@@ -30,6 +30,7 @@ from grasp_core.files.records import UNRECORDED
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.contact_forces import least_friction_forces
 from grasp_core.values import Contact, Grasp
+from scenes.mujoco.closure_scene import Scene
 from scenes.mujoco.fingertip_room import clashes, fitting_radius
 from sim_validate.engine.held_or_let_go import LET_GO, HoldVerdict, Outcome, Trace, judge
 from sim_validate.engine.rig import Rig, squeezed
@@ -37,6 +38,7 @@ from sim_validate.engine.schedules import TrialLoad
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.engine.stepping import Bench
 
+LOW_FRICTION = "low_friction"
 FRICTION_SHARE = 0.9
 """Friction of the low-friction control, relative to the lowest at which the grasp is in closure."""
 LEAST_CONTROL_FRICTION = 1e-4
@@ -77,7 +79,7 @@ def negative_controls(
     """Make the controls that exist: low friction, fewer fingers, moved contacts; all proved."""
     setup = setup or Setup()
     lower = FRICTION_SHARE * grasp.critical_friction
-    low_friction = _refuted("low_friction", grasp.contacts, lower, setup)
+    low_friction = _refuted(LOW_FRICTION, grasp.contacts, lower, setup)
     candidates = (
         low_friction if lower >= LEAST_CONTROL_FRICTION else iter(()),
         _fingers_removed(grasp, friction, setup),
@@ -180,9 +182,12 @@ class ControlVerdict(Declared):
         return all(trial.hold.outcome in LET_GO for trial in self.tried)
 
 
-def try_control(body: Polyhedron, control: Control, agenda: Agenda, setup: Setup) -> ControlVerdict:
-    """Simulate a negative control under the loads that it must not hold."""
-    rig, loads = control_case(body, control, setup)
+def try_control(
+    body: Polyhedron, control: Control, agenda: Agenda, setup: Setup,
+    compiled: Bench[Scene] | None = None,
+) -> ControlVerdict:  # fmt: skip
+    """Simulate a negative control under the loads that it must not hold (see `control_case`)."""
+    rig, loads = control_case(body, control, setup, compiled)
     traces = rig.traced(rig.holds([each.load for each in loads], [each.settling for each in loads]))
     layout = rig.bench.scene.layout
     tried = tuple(
@@ -196,14 +201,20 @@ def try_control(body: Polyhedron, control: Control, agenda: Agenda, setup: Setup
 
 
 def control_case(
-    body: Polyhedron, control: Control, setup: Setup
+    body: Polyhedron, control: Control, setup: Setup, compiled: Bench[Scene] | None = None
 ) -> tuple[Rig, tuple[ControlLoad, ...]]:
-    """Close fingers on a control, and find the loads that it must not hold."""
-    # other contacts than the grasp's may lack room for its fingertips
-    fitting = replace(setup, fingers=replace(setup.fingers, fingertip_radius_m=None))
-    scene = fitting.scene(body, control.contacts, control.friction)
+    """Close fingers on a control, and find the loads that it must not hold.
+
+    A scene of the same contacts that is `compiled` with any friction is used again: trials are told
+    theirs.
+    """
     idle = _planned(body, control, setup, UNLOADED, np.zeros(6))
-    bench = Bench(scene, threads=setup.threads, timeout_s=setup.timeout_s)
+    bench = compiled
+    if bench is None:
+        # other contacts than the grasp's may lack room for its fingertips
+        fitting = replace(setup, fingers=replace(setup.fingers, fingertip_radius_m=None))
+        scene = fitting.scene(body, control.contacts, control.friction, idle.load.forces)
+        bench = Bench(scene, threads=setup.threads, timeout_s=setup.timeout_s)
     rig = squeezed(bench, setup, idle.load.forces, control.friction, idle.settling)
     # The separating wrench is a linear function of wrenches. With torques measured in object
     # radii its coefficients are times the scale; the wrench along them is times it once more.

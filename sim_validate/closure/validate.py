@@ -36,7 +36,13 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Grasp
 from scenes.mujoco.closure_scene import Scene
 from scenes.mujoco.fingertip_room import clashes
-from sim_validate.closure.controls import Control, ControlVerdict, negative_controls, try_control
+from sim_validate.closure.controls import (
+    LOW_FRICTION,
+    Control,
+    ControlVerdict,
+    negative_controls,
+    try_control,
+)
 from sim_validate.closure.verdict import (
     AGREEMENT,
     NoisyTrial,
@@ -140,7 +146,11 @@ def tested(
     controls, repeats = tuple[ControlVerdict, ...](), None
     if agenda.controls:
         made = negative_controls(body, grasp, friction, agenda.seed, setup)
-        controls = tuple(try_control(body, each, agenda, setup) for each in made)
+        # where no size is asked for, its fingertips at lower friction are the grasp's
+        same = {LOW_FRICTION: rig.bench} if setup.fingers.fingertip_radius_m is None else {}
+        controls = tuple(
+            try_control(body, each, agenda, setup, same.get(each.name)) for each in made
+        )
     if agenda.repeats:  # the same fingertips hold the same wrenches
         named = [(planned.name, planned.load.wrench) for planned in loads]
         repeats = robustness(body, grasp, friction, named, agenda, for_repeats(setup, scene))

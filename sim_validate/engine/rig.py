@@ -149,7 +149,9 @@ class Rig:
     ) -> tuple[Motion, ...]:
         told = [trial.told(self.bench.scene.layout) for trial in trials]
         start = self.closed and self.closed.state
-        return self.bench.simulated(told, start, ends and ends.following)
+        if ends is None:
+            return self.bench.simulated(told, start)
+        return self.bench.simulated(told, start, ends.following, ends.earliest)
 
     def _traces(self, trials: Sequence[Schedule], motions: Sequence[Motion]) -> tuple[Trace, ...]:
         closed = self.closed

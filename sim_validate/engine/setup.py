@@ -19,7 +19,7 @@ import numpy as np
 from annotated_types import Interval, Len
 
 from grasp_core.allowed_values import LARGEST, SMALLEST, Seed, Vector
-from grasp_core.arrays import Wrench, frozen_copy, to_digits
+from grasp_core.arrays import Array, Wrench, frozen_copy, to_digits
 from grasp_core.closure.closure_certificate import ClosureCertificate
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import force_closure
@@ -101,11 +101,15 @@ class Setup(ScaledScene):
         """Return the least friction of force closure by fingertips as soft as these."""
         return critical_friction(contacts, torsion_m=self.physics.torsion_m)
 
-    def scene(self, body: Polyhedron, grasp: Grasp | Sequence[Contact], friction: float) -> Scene:
-        """Build the MuJoCo scene of a grasp with these settings."""
+    def scene(
+        self, body: Polyhedron, grasp: Grasp | Sequence[Contact], friction: float,
+        squeeze: Array | None = None,
+    ) -> Scene:  # fmt: skip
+        """Build the MuJoCo scene of a grasp with these settings (see `build_scene`)."""
         return build_scene(
-            body, grasp, friction, fingers=self.fingers, physics=self.physics, surface=self.surface
-        )
+            body, grasp, friction, fingers=self.fingers, physics=self.physics,
+            surface=self.surface, squeeze=squeeze,
+        )  # fmt: skip
 
 
 @declared

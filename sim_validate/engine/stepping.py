@@ -12,8 +12,9 @@ that moves as told.
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Generic, TypeAlias, TypeVar
 
 import numpy as np
@@ -28,6 +29,14 @@ STATE = (
     "time", "qpos", "qvel", "ctrl", "qfrc_applied", "xfrc_applied", "mocap_pos", "mocap_quat",
 )  # fmt: skip
 """Parts of a state, which lie in the order of their bits."""
+WHOLE_STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+TOLD_BITS = sum(
+    int(getattr(mujoco.mjtState, f"mjSTATE_{name}"))
+    for name in ("CTRL", "QFRC_APPLIED", "XFRC_APPLIED", "EQ_ACTIVE", "MOCAP_POS", "MOCAP_QUAT")
+)
+"""Bits of the parts of a state from the servos' commands to the pose of what moves as told."""
+LONGEST_BLOCK = 64
+"""Largest number of samples that are simulated in one call, so that memory stays small."""
 CLOCK = 0
 OBJECT_END, PALM_END = 6, 12
 """Joint velocities up to the end of the object's, and up to the end of the palm's."""
@@ -63,7 +72,7 @@ def state_parts(model: mujoco.MjModel) -> dict[str, slice]:
 
     A batch finds them too, but needs a whole `MjData` for it, which takes longer than most trials.
     """
-    found, every = {}, int(mujoco.mjtState.mjSTATE_INTEGRATION)
+    found, every = {}, WHOLE_STATE
     for name in STATE:
         bit = int(getattr(mujoco.mjtState, f"mjSTATE_{name.upper()}"))
         end = mujoco.mj_stateSize(model, (2 * bit - 1) & every)
@@ -150,6 +159,38 @@ class Motion:
         return replace(self, health=self.health.after(earlier.health))
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Inputs:
+    """What the simulator is told in each of n samples of trials."""
+
+    told: Array
+    """All inputs in a state, from the servos' commands on, (trials, n, inputs)."""
+    first: int
+    """Where inputs begin in a state."""
+    used: tuple[slice, ...]
+    """Parts of a state that are told."""
+    friction: tuple[Array, Array] | None
+    """The simulator's frictions, (simulations, shapes), and the values told, (trials, n,
+    shapes)."""
+
+    def views(self, states: Array) -> list[tuple[Array, Array]]:
+        """Return the views of the simulator's states and frictions that are told, and what."""
+        told = [
+            (states[:, part], self.told[:, :, part.start - self.first : part.stop - self.first])
+            for part in self.used
+        ]
+        return told if self.friction is None else [*told, self.friction]
+
+    def blocks(self, unseen: int) -> Iterator[tuple[int, int]]:
+        """Yield first samples, and ends, of blocks of the first samples of like friction."""
+        end = max(0, min(unseen, self.told.shape[1]))
+        cuts = {*range(0, end, LONGEST_BLOCK), end}
+        if self.friction is not None:
+            changes = np.diff(self.friction[1][:, :end], axis=1).any(axis=(0, 2))
+            cuts |= set((1 + np.flatnonzero(changes)).tolist())
+        return pairwise(sorted(cuts))
+
+
 Following: TypeAlias = Callable[[Indices, Indices, Array, Array], Indices]
 """Function that is told which trials are at which samples, with positions and speeds of the joints
 of all trials, and gives the sample after it for each; one beyond its last sample ends a trial."""
@@ -189,20 +230,25 @@ class Bench(Generic[AnyScene]):
 
     def simulated(
         self, trials: Sequence[Told], start: Array | None = None,
-        following: Following | None = None,
+        following: Following | None = None, unseen: int = 0,
     ) -> tuple[Motion, ...]:  # fmt: skip
-        """Simulate trials, all from the same state, (size,), or from one each, (trials, size)."""
+        """Simulate trials, all from the same state, (size,), or from one each, (trials, size).
+
+        Before the sample `unseen` there is nothing that `following` must be told.
+        """
         sims, lengths = self._begun(trials, start), [len(each.wrenches) for each in trials]
         count, most = len(trials), max(lengths)
-        told, begun = self._told(sims, trials, most), sims.state[:count, CLOCK].copy()
-        views = [self._field(sims, name) for name in ("qpos", *self.kept)]
-        read = [(view, np.zeros((count, most, *view.shape[1:]))) for view in views]
-        counts, skipped, errors, late = self._stepped(sims, told, read, lengths, following)
+        inputs, begun = self._inputs(sims, trials, most), sims.state[:count, CLOCK].copy()
+        views = {name: self._field(sims, name) for name in ("qpos", *self.kept)}
+        read = {name: np.zeros((count, most, *view.shape[1:])) for name, view in views.items()}
+        ahead = self._rolled(sims, inputs, read, min(lengths) if following is None else unseen)
+        told, seen = inputs.views(sims.state), [(views[name], read[name]) for name in views]
+        counts, skipped, errors, late = self._stepped(sims, told, seen, lengths, following, ahead)
         off = sims.state[:count, CLOCK] - (begun + self.chunk * counts * self.step_s)
         times = np.arange(1.0, most + 1.0) * self.chunk * self.step_s
         motions = list[Motion]()
         for trial, own in enumerate(counts.tolist()):
-            joints, *kept = (series[trial, :own] for _, series in read)
+            joints, *kept = (series[trial, :own] for series in read.values())
             state = sims.state[trial].copy()
             health = Health(
                 bool(np.isfinite(state).all() and np.isfinite(joints).all()),
@@ -214,11 +260,42 @@ class Bench(Generic[AnyScene]):
             )
         return tuple(motions)
 
+    def _rolled(
+        self, sims: batch.Batch, inputs: "Inputs", read: Mapping[str, Array], unseen: int
+    ) -> int:
+        """Simulate samples in which nothing is looked at, many in one call; return their number.
+
+        It ends early before trouble, such as a warning, which is to be seen sample by sample.
+        """
+        count, every, end = len(inputs.told), np.arange(len(inputs.told)), 0
+        for first, end in inputs.blocks(unseen):
+            if time.monotonic() > self.deadline:
+                return first
+            before = sims.state[:count].copy()
+            if inputs.friction is not None:
+                view, values = inputs.friction
+                view[:count] = values[:, first]
+            told = np.repeat(inputs.told[:, first:end], self.chunk, axis=1)
+            record = {WHOLE_STATE if name == "state" else name: name for name in read}
+            try:
+                with unlogged():
+                    found = sims.rollout(told.shape[1], told, TOLD_BITS, tuple(record), every)
+            except batch.SimulationError:
+                found = None
+            if found is None or sims.warning[:count, :, 1].any():
+                sims.reset(every, stage=mujoco.mjtStage.mjSTAGE_NONE.value)
+                sims.state[:count] = before
+                return first
+            for own, name in record.items():
+                read[name][:, first:end] = found[own][:, self.chunk - 1 :: self.chunk]
+        return end
+
     def _stepped(
         self, sims: batch.Batch, told: Sequence[tuple[Array, Array]],
         read: Sequence[tuple[Array, Array]], lengths: Sequence[int], following: Following | None,
+        ahead: int,
     ) -> tuple[Indices, Indices, dict[int, str], Indices]:  # fmt: skip
-        """Step trials through their samples.
+        """Step trials through their samples, after those that were simulated `ahead`.
 
         Before a sample each view of the simulator gets the values that are told, after it each view
         that is read is copied. Gives the numbers of samples that were simulated and left out,
@@ -226,8 +303,9 @@ class Bench(Generic[AnyScene]):
         """
         every, count = np.array(lengths), len(lengths)
         joints, speeds = self._field(sims, "qpos"), self._field(sims, "qvel")
-        samples, counts, skipped = np.zeros((3, count), dtype=np.intp)
-        going, errors = np.arange(count), dict[int, str]()
+        samples, counts = np.full((2, count), ahead, dtype=np.intp)
+        skipped, errors = np.zeros(count, dtype=np.intp), dict[int, str]()
+        going = np.flatnonzero(samples < every)
         with unlogged():
             while going.size and time.monotonic() <= self.deadline:
                 now = samples[going]
@@ -319,31 +397,36 @@ class Bench(Generic[AnyScene]):
             return sims.state
         return sims.state[:, self.parts[name]] if name in self.parts else sims.bind(name)
 
-    def _told(
-        self, sims: batch.Batch, trials: Sequence[Told], most: int
-    ) -> list[tuple[Array, Array]]:
-        """Return the views that are told something, and what, (trials, most, ...).
+    def _inputs(self, sims: batch.Batch, trials: Sequence[Told], most: int) -> "Inputs":
+        """Lay out what the simulator is told in each sample.
 
         A trial that is told nothing where others are keeps what is there.
         """
-        moved = slice(self.parts["mocap_pos"].start, self.parts["mocap_quat"].stop)
-        views = {
-            "wrenches": self._field(sims, "xfrc_applied").reshape(sims.nsim, -1, 6)[:, self.body],
-            "commands": self._field(sims, "ctrl"),
-            "palm": self._field(sims, "qfrc_applied")[:, OBJECT_END:PALM_END],
-            "mocap": sims.state[:, moved],
+        wrench = self.parts["xfrc_applied"].start + 6 * self.body
+        palm = self.parts["qfrc_applied"].start
+        columns = {
+            "wrenches": slice(wrench, wrench + 6),
+            "commands": self.parts["ctrl"],
+            "palm": slice(palm + OBJECT_END, palm + PALM_END),
+            "mocap": slice(self.parts["mocap_pos"].start, self.parts["mocap_quat"].stop),
         }
-        if any(each.friction is not None for each in trials):
-            self.frictions = sims.expand("geom_friction")
-            views["friction"] = self.frictions[:, self.rubbing, 0]
-        told = list[tuple[Array, Array]]()
-        for name, view in views.items():
+        given = slice(self.parts["ctrl"].start, self.parts["mocap_quat"].stop)
+        told = np.repeat(sims.state[: len(trials), None, given], most, axis=1)
+        used = list[slice]()
+        for name, where in columns.items():
             rows = [getattr(each, name) for each in trials]
-            given = [row for row in rows if row is not None]
-            if not given:
-                continue
-            values = np.zeros((len(trials), most, given[0].shape[1]))
-            for own, row, there in zip(values, rows, view, strict=False):
-                own[: most if row is None else len(row)] = there if row is None else row
-            told.append((view, values))
-        return told
+            for own, row in zip(told, rows, strict=True):
+                if row is not None:
+                    own[: len(row), where.start - given.start : where.stop - given.start] = row
+            if any(row is not None for row in rows):
+                used.append(where)
+        frictions = [each.friction for each in trials]
+        if all(each is None for each in frictions):
+            return Inputs(told, given.start, tuple(used), None)
+        self.frictions = sims.expand("geom_friction")
+        view = self.frictions[:, self.rubbing, 0]
+        rubs = np.repeat(view[: len(trials), None], most, axis=1)
+        for own, row in zip(rubs, frictions, strict=True):
+            if row is not None:
+                own[: len(row)] = row
+        return Inputs(told, given.start, tuple(used), (view, rubs))
