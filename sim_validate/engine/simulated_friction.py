@@ -67,8 +67,7 @@ def released_friction(
 
     def stays(frictions: list[float]) -> list[bool | None]:
         threshold = share * bench.scene.layout.grasp_size_m
-        trials = rig.releases(high, frictions, threshold)
-        return [trace.stayed(threshold) for trace in rig.traced(trials)]
+        return rig.stayed(rig.releases(high, frictions, threshold), threshold)
 
     if predicted < protocol.least_friction:
         (held,) = stays([protocol.least_friction])

@@ -350,12 +350,14 @@ class Bench(Generic[AnyScene]):
         with unlogged():
             mujoco.mj_forward(self.model, data)
         normals, depths = np.full((len(tips), 3), np.nan), np.full(len(tips), np.nan)
+        met, heights = data.contact.geom, data.contact.dist
+        outward = data.contact.frame.reshape(-1, 9)[:, :3]
         for finger, tip in enumerate(self.shapes(tips)):
-            own = [contact for contact in data.contact if tip in contact.geom]
-            if own and not (one and len(own) > 1):
-                contact = min(own, key=lambda each: each.dist)
-                normals[finger] = contact.frame[:3] * (1.0 if contact.geom[0] == tip else -1.0)
-                depths[finger] = -contact.dist
+            own = np.flatnonzero((met == tip).any(axis=1))
+            if own.size and not (one and own.size > 1):
+                deepest = own[np.argmin(heights[own])]
+                normals[finger] = outward[deepest] * (1.0 if met[deepest, 0] == tip else -1.0)
+                depths[finger] = -heights[deepest]
         return normals, depths
 
     def touching(self, states: Sequence[Array]) -> list[set[str]]:
