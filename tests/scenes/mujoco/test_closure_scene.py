@@ -128,6 +128,19 @@ def test_fingers_push_as_hard_as_their_keyframe_says(held):
         assert np.linalg.norm(data.qpos[:3]) < 1e-3 * scene.layout.radius_m
 
 
+def test_a_given_squeeze_is_that_of_the_keyframes(held):
+    body, grasp, _, _ = held
+    forces = grasp.normals * np.array([1.0, 2.0, 3.0, 4.0])[:, None]
+    scene = scenes.build_scene(body, grasp, squeeze=forces)
+    model, _ = compiled(scene, "grasp")
+    pushes = model.key("grasp").ctrl * scene.layout.holder.servo
+    np.testing.assert_allclose(pushes[::3] / pushes[-3], [0.25, 0.5, 0.75, 1.0], rtol=1e-8)
+    with pytest.raises(gc.InputError, match="squeeze"):
+        scenes.build_scene(body, grasp, squeeze=-forces)
+    with pytest.raises(gc.InputError, match="squeeze"):
+        scenes.build_scene(body, grasp, squeeze=forces[:2])
+
+
 def test_the_last_digits_of_contacts_do_not_change_the_text(held):
     """Other machines plan the same contacts with other last digits."""
     body, grasp, scene, _ = held

@@ -11,8 +11,14 @@ import pytest
 import grasp_core as gc
 import scenes
 from grasp_core.families.regulus_kernel import LEAST_DEPTH
-from sim_validate.closure.controls import Control, negative_controls, try_control
+from sim_validate.closure.controls import (
+    LOW_FRICTION,
+    Control,
+    negative_controls,
+    try_control,
+)
 from sim_validate.engine.setup import Agenda, Setup
+from sim_validate.engine.stepping import Bench
 from tests.grasp_core.families.printed_paper import printed_regulus
 from tests.grasp_core.quadruples import paired_quadruples
 from tests.sim_validate.rigs import grasps
@@ -48,6 +54,21 @@ def test_the_simulator_lets_go_of_every_control_and_its_certificate_verifies():
         kinds[control.name] += 1
     assert sum(kinds.values()) >= 25
     assert set(kinds) == {"low_friction", "fingers_removed", "contacts_moved"}
+
+
+def test_a_control_in_the_compiled_scene_of_its_grasp_is_that_of_its_own_to_the_last_bit():
+    agenda, tried = Agenda(keep_traces=True), 0
+    for body, grasp, control in all_controls():
+        if control.name != LOW_FRICTION:
+            continue
+        bench = Bench(Setup().scene(body, grasp, FRICTION))
+        alone = try_control(body, control, agenda, Setup())
+        beside = try_control(body, control, agenda, Setup(), bench)
+        for one, other in zip(alone.tried, beside.tried, strict=True):
+            assert one.hold == other.hold
+            np.testing.assert_array_equal(one.trace.gaps_m, other.trace.gaps_m)
+            tried += len(one.trace.times_s) > 0
+    assert tried >= 5
 
 
 def test_moved_contacts_stay_on_their_faces_and_leave_their_regions():

@@ -60,6 +60,32 @@ def test_trials_together_are_those_of_a_plain_loop_to_the_last_bit(held, threads
     assert max(moved) > 100.0 * min(moved)
 
 
+def seen_each_time(_going, samples, _joints, _speeds):
+    """A look at every sample, which ends nothing."""
+    return samples + 1
+
+
+@pytest.mark.parametrize("wrench", [0.0, 1e14])
+def test_samples_in_one_call_are_those_that_are_looked_at_to_the_last_bit(held, wrench):
+    """What diverges or warns, too: after the call that does, samples are simulated one by one."""
+    _, _, rig = held
+    scene, wild = rig.bench.scene, TrialLoad(np.full(6, wrench), rig.idle.forces)
+    trials = [*trials_of(held), *rig.holds([wild])]
+    told = [trial.told(scene.layout) for trial in trials]
+    bench = Bench(scene, kept=("qvel", "state"))
+    pairs = zip(
+        bench.simulated(told, rig.closed.state),
+        bench.simulated(told, rig.closed.state, seen_each_time),
+        strict=True,
+    )
+    for together, alone in pairs:
+        assert together.health == alone.health
+        series = zip((together.joints, *together.kept), (alone.joints, *alone.kept), strict=True)
+        for one, other in series:
+            np.testing.assert_array_equal(one, other)
+    assert bool(together.health.fault) == (wrench > 0.0)
+
+
 def test_trials_without_frictions_have_the_scenes_after_trials_that_changed_them(held, monkeypatch):
     """Batches of MuJoCo 3.17 cannot say which frictions were changed."""
     monkeypatch.delattr(batch.Batch, "expanded", raising=False)
