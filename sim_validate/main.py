@@ -212,7 +212,9 @@ def run_and_exit() -> None:
     """Run the `graspproof` command as a program, and exit with its exit code."""
     gc.set_threshold(COLLECTED_AFTER)
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "1")  # it would look through all packages
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # for small matrices others wait, and busily
     steady_streams()
     code = main()
     end_streams()
+    gc.freeze()  # ending, Python would look through all objects for circles
     sys.exit(code)
