@@ -171,11 +171,8 @@ def _stamp(module: str, path: Path) -> str:
                 texts[name] = _text(name)
                 if name.endswith(KERNEL_ENDING):
                     ahead.append(name)
-    parts = (*sorted(texts.items()), sys.implementation.cache_tag, *map(_version, COMPILERS))
+    parts = (*sorted(texts.items()), sys.implementation.cache_tag, *map(version, COMPILERS))
     return hashlib.sha256(repr(parts).encode()).hexdigest()[:COPY_HASH_DIGITS]
-
-
-_version = cache(version)  # which reads a file
 
 
 @cache

@@ -18,6 +18,7 @@ from tyro.conf import FlagCreatePairsOff
 
 from grasp_core.errors import GraspError, InputError
 from grasp_core.messages import FieldError, near, shown
+from grasp_core.time_spent import TIME_SPENT, in_words
 from sim_validate.commands.exit_codes import (
     Exit,
     FlagsError,
@@ -170,6 +171,7 @@ def _dispatch(name: str, command: "Spoken") -> int:
             _warn(name, command, reporter)
             action = resolve_name(f"sim_validate.{COMMANDS[name].action}")
             code = action(command, reporter)
+            reporter.detail(in_words(TIME_SPENT.taken()))
             if sys.stdout is not None:  # pyright: ignore[reportUnnecessaryComparison] - may be closed
                 sys.stdout.flush()
             return code
