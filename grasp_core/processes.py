@@ -27,6 +27,8 @@ from queue import Empty, SimpleQueue
 from threading import Event, Lock, Thread
 from typing import IO, Any, TypeVar
 
+from grasp_core.time_spent import TIME_SPENT
+
 GivenTask = TypeVar("GivenTask")
 Result = TypeVar("Result")
 
@@ -205,7 +207,7 @@ class _Process:
         )  # fmt: skip
 
     def ask(self, function: Callable[[Any], Any], task: Any) -> bytes:
-        """Have a task done; return a pickled pair of result and error."""
+        """Have a task done; return result, error and time spent, pickled."""
         if self.program.stdin is None or self.program.stdout is None:
             raise OSError("no pipe was opened")
         send(self.program.stdin, (None if function == self.function else function, task))
@@ -264,7 +266,8 @@ def unpacked(message: bytes) -> Any:
 
 def _result_of(answer: bytes) -> Any:
     """Return a task's result, or raise the error in its place."""
-    result, error = unpacked(answer)
+    result, error, spent = unpacked(answer)
+    TIME_SPENT.add(spent)
     if error is not None:
         raise error
     return result
@@ -289,7 +292,7 @@ def main() -> None:
                 answer = (function(task), None)
             except Exception as error:
                 answer = (None, error)
-            send(answers, answer)
+            send(answers, (*answer, TIME_SPENT.taken()))
     finally:
         os._exit(1)  # Python cannot end in order while a thread reads its input
 

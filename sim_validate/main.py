@@ -18,6 +18,7 @@ from tyro.conf import FlagCreatePairsOff
 
 from grasp_core.errors import GraspError, InputError
 from grasp_core.messages import FieldError, near, shown
+from grasp_core.time_spent import TIME_SPENT, in_words
 from sim_validate.commands.exit_codes import (
     Exit,
     FlagsError,
@@ -41,9 +42,10 @@ ABOUT = (
 PRODUCING = ("plan", "regions", "transfer", "reach")
 """Commands of whose results the exit code says little."""
 
-COLLECTED_AFTER = 50_000
+COLLECTED_AFTER = 400_000
 """Number of new objects after which Python looks for unused circles of objects among them. It is
-700 otherwise, and some per cent of the time of a plan would go into looking in vain."""
+700 otherwise; a tenth of the time of a plan would go into looking among what packages make when
+they are imported, 150,000 objects, and in vain: commands leave next to no circles."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -170,6 +172,7 @@ def _dispatch(name: str, command: "Spoken") -> int:
             _warn(name, command, reporter)
             action = resolve_name(f"sim_validate.{COMMANDS[name].action}")
             code = action(command, reporter)
+            reporter.detail(in_words(TIME_SPENT.taken()))
             if sys.stdout is not None:  # pyright: ignore[reportUnnecessaryComparison] - may be closed
                 sys.stdout.flush()
             return code
@@ -212,7 +215,9 @@ def run_and_exit() -> None:
     """Run the `graspproof` command as a program, and exit with its exit code."""
     gc.set_threshold(COLLECTED_AFTER)
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "1")  # it would look through all packages
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # for small matrices others wait, and busily
     steady_streams()
     code = main()
     end_streams()
+    gc.freeze()  # ending, Python would look through all objects for circles
     sys.exit(code)

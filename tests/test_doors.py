@@ -21,6 +21,7 @@ NOT_TO_PLAN = ("mujoco", "trimesh", "qpsolvers", "scipy.spatial", "scipy.optimiz
 
 NOT_TO_PLAN_AGAIN = (
     *NOT_TO_PLAN, "clarabel", "resvg_py", "PIL", "pyarrow", "jinja2",
+    "jsonschema", "pandas", "proxsuite", "quadprog", "rich.progress",
     "scipy.sparse", "scipy.stats", "grasp_core.regions",
     "grasp_core.optimizing", "sim_validate.engine", "sim_validate.report",
 )  # fmt: skip

@@ -25,6 +25,7 @@ from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import TOO_DEEP, object_of, shown, text_of
 from grasp_core.files.text_files import read_text
 from grasp_core.messages import at, near
+from grasp_core.time_spent import TIME_SPENT
 
 UNRECORDED: Any = Field(exclude=True)
 """Mark in the type of a field that no file holds."""
@@ -167,6 +168,7 @@ class RecordFile(Declared):
         """Return what the file holds, as plain values."""
         return {"schema": self.SCHEMA, **record_of(self)}
 
+    @TIME_SPENT.on("files")
     def text(self) -> str:
         """Return the text of the file; equal records give equal texts."""
         return text_of(self.document())

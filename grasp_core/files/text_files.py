@@ -11,6 +11,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from grasp_core.errors import InputError, about
+from grasp_core.time_spent import TIME_SPENT
 
 UNFINISHED = ".unfinished-"
 """Part of the name of a file that is still being written, or whose writing process was killed."""
@@ -18,6 +19,7 @@ SHOWN = 40
 """Largest number of characters that the name of an unfinished file repeats of the final name."""
 
 
+@TIME_SPENT.on("files")
 def write_parts(path: Path, parts: Iterable[bytes]) -> Path:
     """Write a file from parts of bytes; missing folders are made."""
     path.parent.mkdir(parents=True, exist_ok=True)

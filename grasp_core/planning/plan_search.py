@@ -39,6 +39,7 @@ from grasp_core.processes import Processes
 from grasp_core.small_objects import fitted
 from grasp_core.solvers.ties import SAME_SHARE, first_best, ranks
 from grasp_core.stopping import Stop, until
+from grasp_core.time_spent import TIME_SPENT
 from grasp_core.values import FINGERS, FaceQuadruple, four
 
 Item = TypeVar("Item")
@@ -204,6 +205,7 @@ class PlanSearch:
         """Have another process set up the search anew."""
         return PlanSearch.of, (self.body, self.request)
 
+    @TIME_SPENT.on("planning")
     def found_elsewhere(self, part: SearchPart) -> PartFound:
         """Search one part to its end in another process, which tells its time."""
         begun, found = time.process_time(), self.found_at_once(part)

@@ -33,6 +33,7 @@ from grasp_core.planning.settings import PlanSettings
 from grasp_core.processes import local_processes
 from grasp_core.settings import extended
 from grasp_core.stopping import Stop
+from grasp_core.time_spent import TIME_SPENT
 from grasp_core.values import Grasp
 
 
@@ -151,6 +152,7 @@ MADE_S = 2e-4
 """Time in which a grasp that is found is put into the object's frame [s]."""
 
 
+@TIME_SPENT.on("planning")
 def search_grasps(
     body: Polyhedron, request: PlanRequest, stop: Stop, progress: PlanProgress | None = None,
     *, jobs: int = 1, after_s: float = MADE_S,

@@ -24,6 +24,7 @@ from typing import TypeAlias
 
 from grasp_core.errors import GraspError
 from grasp_core.processes import Processes
+from grasp_core.time_spent import TIME_SPENT, Seconds
 from sim_validate.datasets.clusters import Cluster
 from sim_validate.datasets.making_rows import compute_rows
 from sim_validate.datasets.resuming import Staging
@@ -68,8 +69,8 @@ class UnitTask:
     compute: ComputeUnit = compute_unit
 
 
-def compute_in_worker(task: UnitTask) -> None:
-    """Compute a unit in a worker process, and keep its rows."""
+def compute_in_worker(task: UnitTask) -> Seconds:
+    """Compute a unit in a worker process, and keep its rows; return the time that it took."""
     own = provenance()
     for name, wanted in task.provenance.items():
         if own.get(name) != wanted:
@@ -84,6 +85,7 @@ def compute_in_worker(task: UnitTask) -> None:
         )
     with _ending_after(task.timeout_s):
         task.compute(task.unit, task.staging)
+    return TIME_SPENT.taken()
 
 
 @contextmanager
@@ -134,7 +136,7 @@ def _ended(
     tasks: Sequence[UnitTask], engine: Engine, ahead: int
 ) -> Iterator[tuple[UnitTask, bool]]:
     """Yield each task when it has ended, with whether it is done or its worker process has died."""
-    waiting, under_way = deque(tasks), dict[Future[None], UnitTask]()
+    waiting, under_way = deque(tasks), dict[Future[Seconds], UnitTask]()
     while waiting or under_way:
         while waiting and len(under_way) < ahead:
             task = waiting.popleft()
@@ -145,9 +147,10 @@ def _ended(
         check_interrupted()
 
 
-def _succeeded(future: "Future[None]", task: UnitTask, engine: Engine) -> bool:
+def _succeeded(future: "Future[Seconds]", task: UnitTask, engine: Engine) -> bool:
     error = future.exception()
     if error is None:
+        TIME_SPENT.add(future.result())
         if task.staging.of(task.unit).is_dir():
             return True
         raise WorkerError(

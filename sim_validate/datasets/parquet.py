@@ -33,6 +33,7 @@ from grasp_core.errors import InputError
 from grasp_core.figures import Figure, figures, meanings, unit_of
 from grasp_core.files.json_text import shown
 from grasp_core.files.records import entries, record_of
+from grasp_core.time_spent import TIME_SPENT
 from grasp_core.values import FINGERS
 from sim_validate.datasets.config import KEYS, TableName
 
@@ -203,6 +204,7 @@ def pyarrow() -> Any:
         ) from error
 
 
+@TIME_SPENT.on("files")
 def parquet_bytes(name: TableName, rows: Sequence[RowCells], tables: Tables) -> bytes:
     """Encode the cells of one table's rows as the bytes of a file, sorted by their keys."""
     arrow, held = pyarrow(), io.BytesIO()

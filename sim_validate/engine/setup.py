@@ -32,6 +32,7 @@ from grasp_core.files.text_files import read_text
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.reach import Finger
 from grasp_core.settings import CHOSEN, named
+from grasp_core.time_spent import TIME_SPENT
 from grasp_core.values import Contact, Grasp
 from scenes.mujoco.closure_scene import Scene, build_scene, surface_of
 from scenes.mujoco_options import PhysicsSettings
@@ -101,6 +102,7 @@ class Setup(ScaledScene):
         """Return the least friction of force closure by fingertips as soft as these."""
         return critical_friction(contacts, torsion_m=self.physics.torsion_m)
 
+    @TIME_SPENT.on("scenes")
     def scene(
         self, body: Polyhedron, grasp: Grasp | Sequence[Contact], friction: float,
         squeeze: Array | None = None,

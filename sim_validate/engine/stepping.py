@@ -21,6 +21,7 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.errors import InputError
+from grasp_core.time_spent import TIME_SPENT
 from scenes.mujoco.mjcf_text import SceneText
 from scenes.mujoco.silent_mujoco import batch, mujoco, unlogged
 from scenes.mujoco.version_gaps import WRONG_FACTOR
@@ -48,6 +49,7 @@ CLOCK_SLACK_S = 1e-9
 reset would change it by milliseconds."""
 
 
+@TIME_SPENT.on("scenes")
 def compiled(xml: str) -> mujoco.MjModel:
     """Compile the text of a scene."""
     try:
@@ -260,6 +262,7 @@ class Bench(Generic[AnyScene]):
             )
         return tuple(motions)
 
+    @TIME_SPENT.on("stepping")
     def _rolled(
         self, sims: batch.Batch, inputs: "Inputs", read: Mapping[str, Array], unseen: int
     ) -> int:
@@ -290,6 +293,7 @@ class Bench(Generic[AnyScene]):
                 read[name][:, first:end] = found[own][:, self.chunk - 1 :: self.chunk]
         return end
 
+    @TIME_SPENT.on("stepping")
     def _stepped(
         self, sims: batch.Batch, told: Sequence[tuple[Array, Array]],
         read: Sequence[tuple[Array, Array]], lengths: Sequence[int], following: Following | None,

@@ -17,6 +17,7 @@ from grasp_core.execution.loads import LoadSet, any_direction
 from grasp_core.execution.squeeze_certificate import BestSqueeze
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
+from grasp_core.time_spent import TIME_SPENT
 from grasp_core.values import Contact
 from scenes.mujoco.fingertip_room import fitting_radius
 from scenes.mujoco.held_scene import HeldScene, build_held_scene
@@ -108,7 +109,8 @@ def planned(
     holder: Holder, settings: ExecutionSettings, best: BestSqueeze
 ) -> tuple[HeldScene, HeldDynamics, tuple[Trial, ...], tuple[Skipped, ...]]:
     """Plan an execution: its scene and dynamics, its trials, and those that are left out."""
-    scene = holder.scene(settings, best)
+    with TIME_SPENT.on("scenes"):
+        scene = holder.scene(settings, best)
     dynamics = HeldDynamics(best.grip, scene.layout)
     trials = trials_of(holder.body, scene.layout, settings, dynamics.lowest_frequency)
     return scene, dynamics, *trials

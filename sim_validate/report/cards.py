@@ -13,6 +13,7 @@ from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import about
 from grasp_core.files.text_files import write_text
 from grasp_core.objects.standard_order import Copies, copies_of
+from grasp_core.time_spent import TIME_SPENT
 from scenes.drawing.clips import GraphicsError, write_trial_clip
 from scenes.drawing.pictures import Drawing
 from scenes.drawing.sheets import Sheet, svg_of
@@ -129,6 +130,7 @@ def cards_to_draw(runs: Sequence[RunFolder], clips: int) -> Iterator[Card]:
             yield Card(first.found, first.name, False, script, clip, copies)
 
 
+@TIME_SPENT.on("files")
 def draw(folder: Path, card: Card) -> Drawn:
     """Draw one grasp and write its pictures and charts to the folder of a report."""
     found = card.found

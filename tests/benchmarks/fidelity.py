@@ -22,6 +22,7 @@ import grasp_core as gc
 import scenes
 from grasp_core.closure.contacts import contact_frictions, contact_torsions
 from grasp_core.quality.wrench_limits import WrenchBody, limit_of
+from grasp_core.time_spent import TIME_SPENT, in_words
 from scenes.mujoco_options import PhysicsSettings
 from sim_validate.closure.controls import negative_controls, try_control
 from sim_validate.engine.held_or_let_go import Outcome, judge
@@ -191,8 +192,9 @@ def main():
         usual, each_family = QUICK, 2
     chosen = cases(options.objects or usual[0], usual[1], each_family, options.torsion)
     begun = time.perf_counter()
+    TIME_SPENT.taken()  # that of planning
     found = list(each(examine, chosen, jobs=available_cores()))
-    print(f"examined in {time.perf_counter() - begun:.0f} s")
+    print(f"examined in {time.perf_counter() - begun:.0f} s; {in_words(TIME_SPENT.taken())}")
     figures = report(found)
     wrong = [name for name in MUST_BE_ZERO if figures[name]]
     if wrong:

@@ -6,6 +6,7 @@ import time
 from pathlib import Path
 
 from grasp_core.errors import MeshError, MeshRefusal
+from grasp_core.time_spent import TIME_SPENT
 
 
 def square(number):
@@ -57,3 +58,14 @@ class Counter:
     def __call__(self, _):
         self.calls += 1
         return self.calls
+
+
+@TIME_SPENT.on("stepping")
+def step_for(seconds_and_fails):
+    """Use some processor time, and fail then if told to."""
+    seconds, fails = seconds_and_fails
+    begun = time.process_time()
+    while time.process_time() < begun + seconds:
+        pass
+    if fails:
+        refuse()

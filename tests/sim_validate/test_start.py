@@ -66,3 +66,16 @@ def test_without_a_folder_for_it_the_command_starts_all_the_same(modules):
     (modules.parent / "file").touch()
     cached, there, told = started(modules, XDG_CACHE_HOME=str(modules.parent / "file"))
     assert (cached.startswith(str(modules)), there, told) == (True, "False", "1")
+
+
+@pytest.mark.parametrize(("given", "threads"), [({}, "1"), ({"OPENBLAS_NUM_THREADS": "2"}, "2")])
+def test_a_command_leaves_out_threads_that_wait_and_a_last_look_for_circles(given, threads):
+    code = (
+        "import atexit, gc, os; atexit.register(lambda: print(gc.get_freeze_count() > 0,"
+        " os.environ['OPENBLAS_NUM_THREADS']));"
+        "from sim_validate.start import run_and_exit; run_and_exit()"
+    )
+    usual = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"}
+    ran = subprocess.run([sys.executable, "-c", code, "--version"], env=usual | given, cwd=ROOT,
+                         capture_output=True, text=True, check=True)  # fmt: skip
+    assert ran.stdout.split()[-2:] == ["True", threads]

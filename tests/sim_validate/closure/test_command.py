@@ -1,12 +1,14 @@
 """What the flags of `validate` and `run` put into a verdict."""
 
 import json
+import re
 
 import numpy as np
 import pytest
 
 from sim_validate.commands.exit_codes import Exit
 from sim_validate.main import main
+from sim_validate.processes import workers
 
 TASK = '{"wrenches": [{"name": "lift", "force_n": [0, 0, -3], "torque_n_m": [0, 0.01, 0]}]}'
 
@@ -128,3 +130,20 @@ def test_the_counts_of_controls_that_let_go_and_did_not_add_up(capsys):
     assert main(words) == Exit.NEGATIVE
     said = " ".join(capsys.readouterr().out.split())
     assert "0 of 3 negative controls were let go (all should), 3 were not" in said
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_details_end_with_where_the_time_went(planned, jobs, monkeypatch, capsys):
+    monkeypatch.setattr(workers, "UNITS_PER_PROCESS", 1)
+    monkeypatch.setattr(workers, "START_S", 0.0)
+    words = ["validate", str(planned / "grasps.json"), "-v", "--jobs", str(jobs)]
+    assert main([*words, "--out", str(planned / "out")]) == Exit.GOOD
+    line = capsys.readouterr().err.splitlines()[-1]
+    assert re.sub(r"\d+\.\d\d", "?", line) == (
+        "time: ? s of processor: planning ?, analysis ?, scenes ?, stepping ?, files ?"
+    )
+    total, *parts = map(float, re.findall(r"\d+\.\d\d", line))
+    assert total == pytest.approx(sum(parts), abs=0.005 * (1 + len(parts)))
+    _, _, scenes, stepping, _ = parts
+    assert min(scenes, stepping) > 0.0
+    assert "processor" not in (planned / "out" / "verdicts.json").read_text()

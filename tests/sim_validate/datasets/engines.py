@@ -24,11 +24,11 @@ class Here:
         future = Future()
         try:
             self.before(task.unit)
-            function(task)
+            spent = function(task)
         except Exception as error:
             future.set_exception(error)
         else:
-            future.set_result(None)
+            future.set_result(spent)
         return future
 
 

@@ -32,6 +32,15 @@ def test_a_dataset_is_made_and_nothing_is_wrong_with_it(dataset, answer):
     assert answer("dataset", "verify", dataset) == {"dataset": str(dataset), "faults": []}
 
 
+@pytest.mark.usefixtures("built_here")
+def test_a_build_tells_where_the_time_went(tmp_path, capsys):
+    words = ["dataset", "build", "tetrahedron", *LIGHT, "--out", str(tmp_path / "ds"), "-v"]
+    assert main(words) == Exit.GOOD
+    spent = dict(re.findall(r"(\w+) (\d+\.\d\d)", capsys.readouterr().err.splitlines()[-1]))
+    assert list(spent) == ["planning", "analysis", "scenes", "stepping", "files"]
+    assert all(float(spent[work]) > 0.0 for work in ("planning", "stepping", "files"))
+
+
 def test_a_build_says_how_many_objects_each_split_has(dataset, capsys):
     assert main(["dataset", "build", *OBJECTS, *LIGHT, "--out", str(dataset)]) == Exit.GOOD
     last = capsys.readouterr().out.splitlines()[-1]
