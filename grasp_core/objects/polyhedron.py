@@ -251,9 +251,18 @@ TRIANGLES_AT_ONCE = 256
 """Number of triangles compared with all facets at a time, which needs a few megabytes."""
 
 
+def _is_below_all_faces(body: Polyhedron) -> bool:
+    """Return whether no vertex lies above the plane of a face, which the hull then has, too."""
+    anchors = np.array([face.pieces[0][0] for face in body.faces])
+    heights = body.normals @ body.vertices.T - np.einsum("fi,fi->f", body.normals, anchors)[:, None]
+    return bool(heights.min() >= -FLUSH * body.radius)
+
+
 @lru_cache(maxsize=16)
 def is_convex(body: Polyhedron) -> bool:
     """Return whether all triangles of an object lie on the surface of their convex hull."""
+    if body.patches is None and _is_below_all_faces(body):
+        return True  # without a library of hulls, whose import takes as long as many grasps
     spatial: Any = importlib.import_module("scipy.spatial")
     points = (body.vertices - body.center_of_mass) / body.radius
     facets: Array = spatial.ConvexHull(points).equations

@@ -243,9 +243,12 @@ class Bench(Generic[AnyScene]):
         inputs, begun = self._inputs(sims, trials, most), sims.state[:count, CLOCK].copy()
         views = {name: self._field(sims, name) for name in ("qpos", *self.kept)}
         read = {name: np.zeros((count, most, *view.shape[1:])) for name, view in views.items()}
-        ahead = self._rolled(sims, inputs, read, min(lengths) if following is None else unseen)
         told, seen = inputs.views(sims.state), [(views[name], read[name]) for name in views]
-        counts, skipped, errors, late = self._stepped(sims, told, seen, lengths, following, ahead)
+        unseen = min(lengths) if following is None else unseen
+        with TIME_SPENT.on("stepping"):
+            ahead = self._rolled(sims, inputs, read, unseen)
+            ends = self._stepped(sims, told, seen, lengths, following, ahead)
+        counts, skipped, errors, late = ends
         off = sims.state[:count, CLOCK] - (begun + self.chunk * counts * self.step_s)
         times = np.arange(1.0, most + 1.0) * self.chunk * self.step_s
         motions = list[Motion]()
@@ -262,7 +265,6 @@ class Bench(Generic[AnyScene]):
             )
         return tuple(motions)
 
-    @TIME_SPENT.on("stepping")
     def _rolled(
         self, sims: batch.Batch, inputs: "Inputs", read: Mapping[str, Array], unseen: int
     ) -> int:
@@ -293,7 +295,6 @@ class Bench(Generic[AnyScene]):
                 read[name][:, first:end] = found[own][:, self.chunk - 1 :: self.chunk]
         return end
 
-    @TIME_SPENT.on("stepping")
     def _stepped(
         self, sims: batch.Batch, told: Sequence[tuple[Array, Array]],
         read: Sequence[tuple[Array, Array]], lengths: Sequence[int], following: Following | None,

@@ -85,6 +85,22 @@ def test_a_polyhedron_comes_back_from_trimesh_as_it_was(name):
     assert len(again.faces) == len(body.faces)
 
 
+@pytest.mark.parametrize("height", [0.0, 5e-7, 5e-6, 1e-2])
+def test_a_box_is_convex_unless_its_top_has_a_dent(height):
+    """Flat to a millionth of its radius is flat; the planes of faces and the hull say the same."""
+    mesh = trimesh.creation.box((0.1, 0.08, 0.06))
+    top = mesh.vertices[:, 2] > 0.0
+    rim = [corner for corner in np.flatnonzero(top)]
+    points = np.vstack([mesh.vertices, [0.0, 0.0, 0.03 - height * 0.07]])
+    kept = [face for face in mesh.faces if not top[face].all()]
+    ring = [rim[place] for place in (0, 1, 3, 2)]
+    fan = [[a, b, len(mesh.vertices)] for a, b in zip(ring, ring[1:] + ring[:1], strict=True)]
+    outward = np.cross(*(points[fan[0][1:]] - points[fan[0][0]]))[2] > 0.0
+    faces = [*kept, *(each if outward else each[::-1] for each in fan)]
+    body = gc.Polyhedron.from_mesh(points, np.array(faces), name="dented", faces="planar")
+    assert is_convex(body) is (height < 1e-6)
+
+
 @pytest.mark.parametrize("dent", [1.0, 0.9])
 def test_a_ball_is_convex_unless_it_has_a_dent(dent):
     """It is planned on patches, whose planes cut through the ball."""
