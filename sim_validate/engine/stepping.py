@@ -30,11 +30,16 @@ STATE = (
     "time", "qpos", "qvel", "ctrl", "qfrc_applied", "xfrc_applied", "mocap_pos", "mocap_quat",
 )  # fmt: skip
 """Parts of a state, which lie in the order of their bits."""
-WHOLE_STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
-TOLD_BITS = sum(
-    int(getattr(mujoco.mjtState, f"mjSTATE_{name}"))
-    for name in ("CTRL", "QFRC_APPLIED", "XFRC_APPLIED", "EQ_ACTIVE", "MOCAP_POS", "MOCAP_QUAT")
-)
+
+
+def _bits(name: str) -> int:
+    """Return the bits of a part of a state, or of all of it."""
+    named = "INTEGRATION" if name == "state" else name.upper()
+    return int(getattr(mujoco.mjtState, f"mjSTATE_{named}"))
+
+
+WHOLE_STATE = _bits("state")
+TOLD_BITS = sum(map(_bits, (*STATE[STATE.index("ctrl") :], "eq_active")))
 """Bits of the parts of a state from the servos' commands to the pose of what moves as told."""
 LONGEST_BLOCK = 64
 """Largest number of samples that are simulated in one call, so that memory stays small."""
@@ -76,7 +81,7 @@ def state_parts(model: mujoco.MjModel) -> dict[str, slice]:
     """
     found, every = {}, WHOLE_STATE
     for name in STATE:
-        bit = int(getattr(mujoco.mjtState, f"mjSTATE_{name.upper()}"))
+        bit = _bits(name)
         end = mujoco.mj_stateSize(model, (2 * bit - 1) & every)
         found[name] = slice(end - mujoco.mj_stateSize(model, bit), end)
     return found
@@ -281,7 +286,7 @@ class Bench(Generic[AnyScene]):
                 view, values = inputs.friction
                 view[:count] = values[:, first]
             told = np.repeat(inputs.told[:, first:end], self.chunk, axis=1)
-            record = {WHOLE_STATE if name == "state" else name: name for name in read}
+            record = {_bits(name) if name in {"state", *STATE} else name: name for name in read}
             try:
                 with unlogged():
                     found = sims.rollout(told.shape[1], told, TOLD_BITS, tuple(record), every)
