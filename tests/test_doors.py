@@ -67,6 +67,16 @@ def test_a_command_imports_no_more_than_it_needs(commands, heavy, said):
     assert said in shown
 
 
+def test_a_validation_without_published_tests_imports_no_hands(tmp_path):
+    words = ["plan", "wedge", "--limit", "1", "--out", str(tmp_path), "-q"]
+    assert main(words) == Exit.GOOD
+    code = f"from sim_validate.main import main; main(['validate', {str(tmp_path / 'grasps.json')!r}])"
+    unused = ("grasp_core.hands", "sim_validate.hands", "sim_validate.execution.execute", "trimesh")
+    names, said = imported(code, ("mujoco", *unused))
+    assert names == ["mujoco"]
+    assert "held all wrenches" in said
+
+
 def test_a_plan_that_finds_its_loops_imports_only_what_planning_needs(tmp_path):
     """Compiling loops needs more of numba, so the first of two plans may have to compile them."""
     words = ["plan", "wedge", "--limit", "5", "--out", str(tmp_path)]

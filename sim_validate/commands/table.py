@@ -71,7 +71,7 @@ COMMANDS: Mapping[str, Command] = {
         "anew.",
     ),
     "reach": Command(
-        "hands.flags:Reach", "protocols.command:judge_reach",
+        "hands.flags:Reach", "protocols.judging_command:judge_reach",
         "Look for poses in which a hand stands in grasps: palm pose and joints, checked exactly.",
     ),
     "hand": Command(
