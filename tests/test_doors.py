@@ -70,7 +70,9 @@ def test_a_command_imports_no_more_than_it_needs(commands, heavy, said):
 def test_a_validation_without_published_tests_imports_no_hands(tmp_path):
     words = ["plan", "wedge", "--limit", "1", "--out", str(tmp_path), "-q"]
     assert main(words) == Exit.GOOD
-    code = f"from sim_validate.main import main; main(['validate', {str(tmp_path / 'grasps.json')!r}])"
+    code = (
+        f"from sim_validate.main import main; main(['validate', {str(tmp_path / 'grasps.json')!r}])"
+    )
     unused = ("grasp_core.hands", "sim_validate.hands", "sim_validate.execution.execute", "trimesh")
     names, said = imported(code, ("mujoco", *unused))
     assert names == ["mujoco"]

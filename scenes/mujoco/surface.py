@@ -14,13 +14,13 @@ separated.
 """
 
 import importlib
-from collections.abc import Iterator, Sequence
-from itertools import compress
+from collections.abc import Iterator
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
-from grasp_core.arrays import Array
+from grasp_core.arrays import Array, frozen_copy
 from grasp_core.compiled import compiled
 from grasp_core.geometry.polygons import nearest_on_segments
 from grasp_core.objects.on_faces import nearest_on_triangles
@@ -43,33 +43,60 @@ def touched_solids(body: Polyhedron, near: Array, reach: float) -> tuple[Array, 
     """
     if is_convex(body):
         return None
-    triangles = body.vertices[body.triangles] - body.center_of_mass
-    middles = triangles.mean(axis=1)
-    widest = float(np.linalg.norm(triangles - middles[:, None], axis=2).max())
-    spatial: Any = importlib.import_module("scipy.spatial")
-    tree, kernel = spatial.KDTree(middles), compiled("scenes.mujoco.clearance_kernel")
-    found, thin, slack = list[Array](), THIN_PIECE * body.radius, OVERLAP_SLACK * body.radius
-    pieces = list(_flat_pieces(body))
-    for corners, inward in compress(pieces, _distances(pieces, near) <= reach):
+    pyramids = _pyramids_of(body)
+    places = np.flatnonzero(pyramids.distances(near) <= reach).tolist()
+    return tuple(solid for solid in map(pyramids.solid, places) if solid is not None)
+
+
+class _Pyramids:
+    """The flat pieces of an object's surface, and the pyramid on each, which is made once."""
+
+    def __init__(self, body: Polyhedron) -> None:
+        self.pieces = list(_flat_pieces(body))
+        counts = [len(corners) - 2 for corners, _ in self.pieces]
+        self.starts = np.cumsum([0, *counts[:-1]])
+        self.fans = np.array([
+            corners[[0, at, at + 1]]
+            for corners, _ in self.pieces for at in range(1, len(corners) - 1)
+        ])  # fmt: skip
+        self.triangles = body.vertices[body.triangles] - body.center_of_mass
+        middles = self.triangles.mean(axis=1)
+        self.widest = float(np.linalg.norm(self.triangles - middles[:, None], axis=2).max())
+        spatial: Any = importlib.import_module("scipy.spatial")
+        self.tree = spatial.KDTree(middles)
+        self.thin, self.slack = THIN_PIECE * body.radius, OVERLAP_SLACK * body.radius
+        self.solids: dict[int, Array | None] = {}
+
+    def distances(self, points: Array) -> Array:
+        """Return how far each piece is from the nearest of points (k, 3), (pieces,) [m]."""
+        away = nearest_on_triangles(self.fans, points) - points[:, None]
+        distances = np.linalg.norm(away, axis=2).min(axis=0)
+        return np.minimum.reduceat(distances, self.starts)
+
+    def solid(self, place: int) -> Array | None:
+        """Return the corners of the pyramid on a piece, (n, 3) [m]; None for one that is thin."""
+        if place not in self.solids:
+            self.solids[place] = self._made(*self.pieces[place])
+        return self.solids[place]
+
+    def _made(self, corners: Array, inward: Array) -> Array | None:
         middle = corners.mean(axis=0)
         extent = float(np.linalg.norm(corners - middle, axis=1).max())
         edges = nearest_on_segments(corners, np.roll(corners, -1, axis=0), middle)
         width = float(np.linalg.norm(edges - middle, axis=1).min())
-        if width > thin:
-            depth = SLOPE * width
-            near_by = np.array(tree.query_ball_point(middle, extent + depth + widest), np.int64)
-            depth = float(kernel.clear_depth(corners, inward, depth, triangles, near_by, slack))
-            found.append(np.vstack([corners, middle + depth * inward]))
-    return tuple(found)
+        if width <= self.thin:
+            return None
+        depth, kernel = SLOPE * width, compiled("scenes.mujoco.clearance_kernel")
+        found = self.tree.query_ball_point(middle, extent + depth + self.widest)
+        near_by = np.array(found, np.int64)
+        depth = kernel.clear_depth(corners, inward, depth, self.triangles, near_by, self.slack)
+        return frozen_copy(np.vstack([corners, middle + float(depth) * inward]))
 
 
-def _distances(pieces: Sequence[tuple[Array, Array]], points: Array) -> Array:
-    """Return how far each piece is from the nearest of points (k, 3), (pieces,) [m]."""
-    counts = [len(corners) - 2 for corners, _ in pieces]
-    fans = [corners[[0, at, at + 1]] for corners, _ in pieces for at in range(1, len(corners) - 1)]
-    away = nearest_on_triangles(np.array(fans), points) - points[:, None]
-    distances = np.linalg.norm(away, axis=2).min(axis=0)
-    return np.minimum.reduceat(distances, np.cumsum([0, *counts[:-1]]))
+@lru_cache(maxsize=2)
+def _pyramids_of(body: Polyhedron) -> _Pyramids:
+    """Return the pyramids of an object, which all scenes of its grasps share."""
+    return _Pyramids(body)
 
 
 def _flat_pieces(body: Polyhedron) -> Iterator[tuple[Array, Array]]:
