@@ -231,8 +231,9 @@ class WrenchBody:
         return replace(self.bounded, G=G)
 
     def about_middle(self, wrench: Array) -> Array:
-        """Move a wrench's reference point to the contacts' mean, and scale it to unit size."""
-        moved = np.append(wrench[:3], wrench[3:] - cross(self.middle, wrench[:3]))
+        """Move wrenches' reference point to the contacts' mean, and scale to unit size, (.., 6)."""
+        force, torque = wrench[..., :3], wrench[..., 3:]
+        moved = np.concatenate([force, torque - cross(self.middle, force)], axis=-1)
         return moved / self.scale
 
 

@@ -17,6 +17,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cache
 from html import escape
+from itertools import islice
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -234,19 +235,21 @@ def as_text(data: object) -> str:
 
 
 def _shape(shape: Drawable, body: Polyhedron) -> dict[str, Any]:
-    look = look_of(shape)
-    points = np.empty((0, 3)) if shape.points is None else shape.points
+    look, points = look_of(shape), iter(_whole(shape.vertices(), body))
+    polygons, lines = (
+        [list(islice(points, len(each))) for each in some] for some in (shape.polygons, shape.lines)
+    )
     return {
         "role": shape.role,
         "finger": shape.finger,
         **asdict(look),
-        "polygons": [_whole(polygon, body) for polygon in shape.polygons] if look.fill else [],
-        "lines": [_whole(line, body) for line in shape.lines] if look.line else [],
-        "points": _whole(points, body),
+        "polygons": polygons if look.fill else [],
+        "lines": lines if look.line else [],
+        "points": list(points),
     }
 
 
-def _whole(points: Array, body: Polyhedron) -> Any:
+def _whole(points: Array, body: Polyhedron) -> list[list[int]]:
     return np.rint(PER_RADIUS / body.radius * (points - body.center_of_mass)).astype(int).tolist()
 
 

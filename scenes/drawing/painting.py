@@ -20,7 +20,7 @@ from typing import Annotated, Literal, Self, TypeAlias
 import numpy as np
 
 from grasp_core.allowed_values import Quantity, number
-from grasp_core.arrays import Array, Indices, Point, Polygon
+from grasp_core.arrays import Array, Indices, Point, Polygon, cross
 from grasp_core.arrays import Shape as ArrayShape
 from grasp_core.declared import Declared, declared
 from grasp_core.geometry.polygons import FEWEST_CORNERS, convex_hull
@@ -102,8 +102,8 @@ def _axes(azimuth: float, elevation: float) -> Array:
     flat = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
     up = np.array([0.0, 0.0, 1.0])
     towards = math.cos(elevation) * flat + math.sin(elevation) * up
-    right = np.cross(up, flat)
-    return np.array([right, np.cross(towards, right), towards])
+    right = cross(up, flat)
+    return np.array([right, cross(towards, right), towards])
 
 
 def approaches(grasp: Grasp) -> Array:
@@ -216,10 +216,11 @@ class Window:
         cls, shapes: Sequence[Drawable], numbers: Array, body: Extent, view: Camera, side: float
     ) -> Self:
         """Choose the square around shapes, and around the places of numbers, (k, 3) [m]."""
-        points = np.vstack([*(shape.vertices() for shape in shapes), numbers])
+        every = [shape.vertices() for shape in shapes]
+        points = np.vstack([*every, numbers])
         distances = np.linalg.norm(points - body.center_of_mass, axis=1)
-        kept = [np.full(len(shape.vertices()), shape.role in NEVER_CUT) for shape in shapes]
-        hand = np.concatenate([*kept, np.full(len(numbers), any(each.any() for each in kept))])
+        kept = [shape.role in NEVER_CUT for shape in shapes]
+        hand = np.repeat([*kept, any(kept)], [*map(len, every), len(numbers)])
         flat, _ = view.seen(points[(distances <= CUT_RADII * body.radius) | hand])
         low, high = flat.min(axis=0), flat.max(axis=0)
         half = 0.5 * (1.0 + 2.0 * EMPTY_MARGIN) * float((high - low).max())
@@ -228,7 +229,7 @@ class Window:
         return cls(view, low, float(high[0] - low[0]), side)
 
     def place(self, flat: Array) -> Array:
-        """Find where places in the view [m] are on the sheet, (n, 2) [pixels]."""
+        """Find where places in the view [m] are on the sheet, (.., 2) [pixels]."""
         scale = self.side / self.width
         return np.array([0.0, self.side]) + np.array([scale, -scale]) * (flat - self.low)
 
@@ -307,7 +308,7 @@ class DrawnSurface:
         names = np.unique(places, axis=0, return_inverse=True)[1].reshape(-1)
         ends, following = np.cumsum(counts), np.arange(1, len(corners) + 1)
         following[ends - 1] = ends - counts
-        normals = np.add.reduceat(np.cross(corners, corners[following]), ends - counts)
+        normals = np.add.reduceat(cross(corners, corners[following]), ends - counts)
         lengths = np.linalg.norm(normals, axis=1)
         normals = normals / np.where(lengths > 0.0, lengths, np.inf)[:, None]
         return cls(corners, names, np.repeat(np.arange(len(polygons)), counts), following, normals)
@@ -414,20 +415,19 @@ def _thick(look: RoleLook, window: Window) -> float:
     return round(0.01 * look.line * window.side, 3)
 
 
-def _area(flats: Iterable[Array], colour: str, opacity: float, window: Window) -> Area:
-    """Fill loops of places in the view [m], without corners that would not be seen."""
-    loops = tuple(map(window.place, flats))
+def _area(loops: Sequence[Array], colour: str, opacity: float) -> Area:
+    """Fill loops on the sheet, without corners that would not be seen."""
     if sum(map(len, loops)) > MANY_CORNERS:
-        loops = tuple(thinned(closed(loop))[:-1] for loop in loops)
+        loops = [thinned(closed(loop))[:-1] for loop in loops]
     return Area(tuple(loop for loop in loops if len(loop) >= FEWEST_CORNERS), colour, opacity)
 
 
 def _each(shape: Drawable, look: RoleLook, window: Window) -> Iterator[Near]:
     bright = _brightness(_normals(shape.polygons), window.view).tolist()
     for polygon, shade in zip(shape.polygons, bright, strict=True):
-        flat, near = window.view.seen(polygon)
+        flat, near = window.seen(polygon)
         colour = _shaded(look.colour, shade) if look.shaded else look.colour
-        yield float(near.mean()), _area([flat], colour, look.fill, window)
+        yield float(near.mean()), _area([flat], colour, look.fill)
 
 
 def _glass(shape: Drawable, look: RoleLook, window: Window) -> Iterator[Near]:
@@ -444,35 +444,38 @@ def _glass(shape: Drawable, look: RoleLook, window: Window) -> Iterator[Near]:
         depth = float(near.mean()) if len(near) else 0.0
         for level in np.unique(levels[front == side]).tolist():
             loops = joined(surface, (front == side) & (levels == level))
-            flats = [view.seen(loop)[0] for loop in loops]
-            yield depth, _area(flats, _shaded(look.colour, _shade(level)), look.fill, window)
+            flats = [window.seen(loop)[0] for loop in loops]
+            yield depth, _area(flats, _shaded(look.colour, _shade(level)), look.fill)
 
 
 def _solid(shape: Drawable, look: RoleLook, window: Window) -> Iterator[Near]:
     """Draw a convex body: its outline, and on it the sides that face the viewer."""
     corners, view = shape.vertices(), window.view
     flat, near = view.seen(corners)
-    depth = float(near.mean())
-    middles = np.array([polygon.mean(axis=0) for polygon in shape.polygons])
-    firsts = np.array([polygon[0] for polygon in shape.polygons])
+    depth, placed = float(near.mean()), window.place(flat)
+    counts = np.array([len(polygon) for polygon in shape.polygons])
+    ends = counts.cumsum()
+    middles = np.add.reduceat(corners, ends - counts) / counts[:, None]
     normals = _normals(shape.polygons)
     inward = np.einsum("ij,ij->i", normals, middles - corners.mean(axis=0)) <= 0.0
     normals[inward] *= -1.0
-    facing = np.flatnonzero(np.einsum("ij,ij->i", normals, view.camera - firsts) > 0.0)
+    sights = view.camera - corners[ends - counts]
+    facing = np.flatnonzero(np.einsum("ij,ij->i", normals, sights) > 0.0)
     levels = _levels(_brightness(normals[facing], view))
     mean = round(float(levels.mean())) if len(levels) else SHADES - 1
-    yield depth, _area([convex_hull(flat)], _shaded(look.colour, _shade(mean)), look.fill, window)
+    hull = window.place(convex_hull(flat))
+    yield depth, _area([hull], _shaded(look.colour, _shade(mean)), look.fill)
     for level in sorted({*levels.tolist()} - {mean}):
         alike: list[int] = facing[levels == level].tolist()
-        flats = [view.seen(shape.polygons[side])[0] for side in alike]
-        yield depth, _area(flats, _shaded(look.colour, _shade(level)), look.fill, window)
+        loops = [placed[ends[side] - counts[side] : ends[side]] for side in alike]
+        yield depth, _area(loops, _shaded(look.colour, _shade(level)), look.fill)
 
 
 def _cone(shape: Drawable, look: RoleLook, window: Window) -> Iterator[Near]:
     rim = np.array([polygon[1] for polygon in shape.polygons])
     flat, near = window.view.seen(shape.vertices())
     for part in (convex_hull(flat), window.view.seen(rim)[0]):
-        yield float(near.mean()), _area([part], look.colour, look.fill, window)
+        yield float(near.mean()), _area([window.place(part)], look.colour, look.fill)
 
 
 FILLED: dict[Role, Callable[[Drawable, RoleLook, Window], Iterator[Near]]] = {
@@ -483,7 +486,7 @@ FILLED: dict[Role, Callable[[Drawable, RoleLook, Window], Iterator[Near]]] = {
 def _normals(polygons: Sequence[Array]) -> Array:
     """Return unit normals of flat polygons, (k, 3); zero where first corners are in line."""
     corners = np.array([polygon[:3] for polygon in polygons])
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 1])
+    normals = cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 1])
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
     return normals / np.maximum(lengths, np.finfo(np.float64).tiny)
 
@@ -515,10 +518,11 @@ def _line(line: Array, look: RoleLook, window: Window) -> Iterator[Near]:
     for start, end, first, last in zip(flat, flat[1:], near, near[1:], strict=False):
         length = float(np.linalg.norm(end - start))
         if length > 0.0:
-            for low, high in _spans(length / window.width, look):
-                ends = np.array([start + low * (end - start), start + high * (end - start)])
-                depth = float(first + 0.5 * (low + high) * (last - first)) + nearer
-                yield depth, Line((window.place(ends),), look.colour, thick, look.opacity)
+            spans = np.array(_spans(length / window.width, look))
+            places = window.place(start + spans[..., None] * (end - start))
+            depths = first + spans.mean(axis=1) * (last - first) + nearer
+            for depth, ends in zip(depths.tolist(), places, strict=True):
+                yield depth, Line((ends,), look.colour, thick, look.opacity)
 
 
 def _spans(length: float, look: RoleLook) -> Sequence[tuple[float, float]]:

@@ -23,6 +23,7 @@ import numpy as np
 from grasp_core.allowed_values import Friction, instance, path_of, value_of
 from grasp_core.arrays import Array, Indices, cross
 from grasp_core.cones.spanning import angles_between
+from grasp_core.declared import trusted
 from grasp_core.geometry.polygons import FEWEST_CORNERS
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach
@@ -100,8 +101,8 @@ def rulings(points: Array, directions: Array, center: Array, reach: float) -> tu
     segments = list[Array]()
     for along in np.linspace(-reach, reach, RULINGS):
         start = points[0] + along * directions[0]
-        planes = np.cross(points[1:3] - start, directions[1:3])
-        way = np.cross(planes[0], planes[1])
+        planes = cross(points[1:3] - start, directions[1:3])
+        way = cross(planes[0], planes[1])
         length = float(np.linalg.norm(way))
         if length > LEAST_CROSS_PRODUCT * reach**2:
             way = way / length
@@ -270,13 +271,15 @@ def coarse(vertices: Array, triangles: Indices) -> Array:
     return middles[joined[np.sort(first)]]
 
 
-def pin(finger: int, tip: Array, inward: Array, size: float) -> tuple[Drawable, Drawable]:
+def pin(finger: int, tip: Array, inward: Array, size: float) -> tuple[Drawable, ...]:
     """Return the fingertip and the bar of a finger of a given size that stands on a point."""
     middle, radius = tip - BALL_RADIUS * size * inward, BALL_RADIUS * size
     bar = tube(middle, tip - BAR_LENGTH * size * inward, BAR_RADIUS * size)
-    return (
-        Drawable("finger", finger, polygons=rounded_box(middle, middle, radius, WHOLE_BOX)),
-        Drawable("finger", finger, polygons=bar),
+    ball = rounded_box(middle, middle, radius, WHOLE_BOX)
+    # hundreds of sides, which take longer to check than to make
+    return tuple(
+        trusted(Drawable, role="finger", finger=finger, polygons=sides, lines=(), points=None)
+        for sides in (ball, bar)
     )
 
 
@@ -287,10 +290,10 @@ def _unit(vector: Array) -> Array:
 def ring(center: Array, axis: Array, radius: float) -> Array:
     """Return points of a circle around a unit axis, (CIRCLE, 3)."""
     # The axis of the frame that is farthest from the circle's axis gives a safe cross product.
-    side = np.cross(axis, np.eye(3)[first_best(-np.abs(axis), SAME_SHARE)])
+    side = cross(axis, np.eye(3)[first_best(-np.abs(axis), SAME_SHARE)])
     side /= np.linalg.norm(side)
     angles = 2.0 * np.pi * np.arange(CIRCLE) / CIRCLE
-    around = np.outer(np.cos(angles), side) + np.outer(np.sin(angles), np.cross(axis, side))
+    around = np.outer(np.cos(angles), side) + np.outer(np.sin(angles), cross(axis, side))
     return center + radius * around
 
 

@@ -23,7 +23,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from html import escape
-from itertools import groupby
+from itertools import groupby, pairwise
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
@@ -381,11 +381,10 @@ def _path(mark: Mark) -> str:
 
 def _steps(points: Array) -> str:
     """Write a line as a path: its first point, and the steps to the others."""
-    whole = np.rint(PARTS_PER_PIXEL * points).astype(int)
-    steps = np.diff(whole, axis=0)
-    x, y = whole[0].tolist()
-    kept = steps[steps.any(axis=1)].ravel().tolist() or [0, 0]
-    return f"M{x} {y}l{' '.join(map(str, kept))}".replace(" -", "-")
+    whole: list[list[int]] = np.rint(PARTS_PER_PIXEL * points).astype(int).tolist()
+    x, y = whole[0]
+    steps = [(u - s, v - t) for (s, t), (u, v) in pairwise(whole) if u != s or v != t] or [(0, 0)]
+    return f"M{x} {y}l{' '.join([f'{u} {v}' for u, v in steps])}".replace(" -", "-")
 
 
 def _plain(mark: Mark) -> str:

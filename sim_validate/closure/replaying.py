@@ -166,17 +166,23 @@ def _in_trial(path: Path, found: Recorded, verdict: Verdict, trial: int) -> Reco
 Loads: TypeAlias = Sequence[PlannedLoad | ControlLoad]
 
 
-def replayed(recorded: Recorded, wrench: str | None = None) -> Replayed:
-    """Simulate one trial of a recorded contact set again."""
-    rig, loads, landed = _case(recorded)
+def replayed(
+    recorded: Recorded, wrench: str | None = None, *, as_recorded: bool = True
+) -> Replayed:
+    """Simulate one trial of a recorded contact set again.
+
+    Unless its figures are to be those that were recorded, a trial that holds to its full length is
+    simulated only once: no sample of it was lost, so that the recorded one held, too.
+    """
+    name = wrench or next((each for each, end in recorded.outcomes.items() if end != "held"), None)
+    if name is None and recorded.trial is None and recorded.control is None:
+        name = WEAKEST
+    rig, loads, landed = _case(recorded, name)
     limits = {
         each.name: each.predicted_limit if isinstance(each, PlannedLoad) else None for each in loads
     }
-    usual = next((name for name, end in recorded.outcomes.items() if end != "held"), None)
-    if usual is None:  # the wrench that is hardest to hold
-        named = recorded.trial is None and WEAKEST in limits
-        usual = WEAKEST if named else min(limits, key=lambda name: limits[name] or 0.0)
-    name = wrench or usual
+    # the wrench that is hardest to hold
+    name = name or min(limits, key=lambda each: limits[each] or 0.0)
     held = next((each for each in loads if each.name == name), None)
     if held is None:
         known = ", ".join(limits)
@@ -188,28 +194,33 @@ def replayed(recorded: Recorded, wrench: str | None = None) -> Replayed:
     amiss = clashes(recorded.body, *stacked(landed), layout.drive.radius_m) if landed else ()
     if recorded.grasp is not None and recorded.trial is None:
         amiss = amiss or off_faces(rig.bench, recorded.body, recorded.grasp)
-    (ended,) = rig.traced(trials)
+    hold = judge(watched.trace, layout, recorded.setup.hold, amiss)
+    if as_recorded or hold.outcome is not Outcome.HELD:
+        (ended,) = rig.traced(trials)
+        hold = judge(ended, layout, recorded.setup.hold, amiss)
     return Replayed(
         name=name,
         load=held.load,
         predicted_limit=limits[name],
         required_friction=held.required_friction,
         friction=rig.friction,
-        hold=judge(ended, layout, recorded.setup.hold, amiss),
+        hold=hold,
         watched=watched,
         scene=rig.bench.scene,
     )
 
 
-def _case(recorded: Recorded) -> tuple[Rig, Loads, tuple[Contact, ...]]:
-    """Close fingers on contacts and plan their loads; also give contacts whose tips have room."""
+def _case(recorded: Recorded, wanted: str | None) -> tuple[Rig, Loads, tuple[Contact, ...]]:
+    """Close fingers on contacts and plan the wanted load, or all; also give contacts with room."""
     body, contacts, friction = recorded.body, recorded.contacts, recorded.friction
     setup = recorded.setup
     if recorded.control is not None:
         return _opened(body, recorded.control, contacts, friction, setup)
     scene = setup.scene(body, recorded.grasp or contacts, friction)
     rig = closed_on(scene, setup, friction)
-    planned = LoadPlanner(body, contacts, friction, setup, None).planned(rig.idle, recorded.agenda)
+    planner = LoadPlanner(body, contacts, friction, setup, None)
+    only = wanted if recorded.trial is None else None
+    planned = planner.planned(rig.idle, recorded.agenda, only)
     if recorded.trial is None or recorded.grasp is None:
         return rig, planned, contacts
     setup, agenda = for_repeats(setup, scene), recorded.agenda

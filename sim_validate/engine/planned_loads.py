@@ -1,7 +1,8 @@
 """Chooses the wrenches that a grasp is tested with, and plans finger forces for them."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache, partial
 
 import numpy as np
 
@@ -69,15 +70,22 @@ class LoadPlanner:
         """Find the largest multiple of a wrench that is resisted."""
         return limit_of(self.resisted, wrench)
 
-    def planned(self, idle: TrialLoad, agenda: Agenda) -> tuple[PlannedLoad, ...]:
-        """Plan all wrenches to test, in order: along axes, weakest, random, the user's own."""
+    def planned(
+        self, idle: TrialLoad, agenda: Agenda, only: str | None = None
+    ) -> tuple[PlannedLoad, ...]:
+        """Plan all wrenches to test, in order: along axes, weakest, random, the user's own.
+
+        With the name of one, only that is planned, or all if none has this name.
+        """
         share = self.setup.hold.load_share
         relative = [
             self._load(name, found, share * found.limit, idle)
-            for name, found in _relative(self.resisted, self.body.radius, agenda)
+            for name, find in _relative(self.resisted, self.body.radius, agenda).items()
+            if only in (None, name)
+            for found in [find()]
         ]
-        own = [(each.name, each.wrench) for each in agenda.wrenches]
-        return (*relative, *self.as_they_are(idle, own))
+        own = [(each.name, each.wrench) for each in agenda.wrenches if only in (None, each.name)]
+        return (*relative, *self.as_they_are(idle, own)) or self.planned(idle, agenda)
 
     def as_they_are(
         self, idle: TrialLoad, wrenches: Sequence[tuple[str, Array]]
@@ -117,13 +125,13 @@ class LoadPlanner:
 
 def _relative(
     resisted: WrenchBody, torque_scale: float, agenda: Agenda
-) -> list[tuple[str, WrenchLimit]]:
-    """Name the wrenches that are applied at a share of their limit, and compute each limit."""
-    axes = [limit_of(resisted, wrench) for wrench in axis_wrenches(torque_scale)]
-    weakest = weakest_from(resisted, axes, torque_scale)
+) -> dict[str, Callable[[], WrenchLimit]]:
+    """Name the wrenches that are applied at a share of their limit, and how to find each limit."""
+    axes = [cache(partial(limit_of, resisted, wrench)) for wrench in axis_wrenches(torque_scale)]
+    weakest = partial(weakest_from, resisted, (find() for find in axes), torque_scale)
     rng = np.random.default_rng(agenda.seed)
     scale = np.array([1.0] * 3 + [torque_scale] * 3)
     drawn = rng.normal(size=(agenda.random_wrenches, 6))
     units = scale * drawn / np.linalg.norm(drawn, axis=1, keepdims=True)
-    others = [(RANDOM.format(place), limit_of(resisted, unit)) for place, unit in enumerate(units)]
-    return [*zip(AXIS_NAMES, axes, strict=True), (WEAKEST, weakest), *others]
+    others = {RANDOM.format(i): partial(limit_of, resisted, unit) for i, unit in enumerate(units)}
+    return {**dict(zip(AXIS_NAMES, axes, strict=True)), WEAKEST: weakest, **others}

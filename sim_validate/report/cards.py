@@ -171,7 +171,7 @@ def _add_motion(drawn: Drawn, found: Findings, verdict: Verdict, clip: Path | No
     run = found.run
     saved = replace(run.saved, friction=run.friction)
     recorded = of_verdict(run.path / Verdicts.FILE, saved, verdict, WantedTrial(found.grasp.id))
-    trial = replayed(recorded)
+    trial = replayed(recorded, as_recorded=False)
     threshold = recorded.setup.hold.hold_threshold * trial.scene.layout.grasp_size_m
     drawn.motion = tuple(map(svg_of, motion_panels(trial, threshold)))
     drawn.trial, drawn.outcome = trial.name, trial.hold.outcome.value

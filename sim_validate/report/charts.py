@@ -32,7 +32,8 @@ from grasp_core.errors import InputError
 from grasp_core.messages import MICRO, MILLI
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.ferrari_canny import ferrari_canny
-from grasp_core.quality.wrench_limits import wrench_limits
+from grasp_core.quality.limit_bounds import limit_bounds
+from grasp_core.quality.wrench_limits import WrenchBody, body_of, limit_of
 from grasp_core.values import Grasp
 from scenes.drawing.painting import Camera
 from scenes.drawing.panels import ROW, SMALL_TYPE, Axis, KeyLine, Panel, marker, thinned
@@ -66,6 +67,8 @@ from sim_validate.engine.held_or_let_go import LET_GO, Outcome
 
 LONGITUDES, LATITUDES = 21, 11
 """Numbers of a map's nodes: around, where the first is also the last, and from pole to pole."""
+MAP_GAP = 1e-3
+"""Largest error of a map's nodes, as a share of them; its levels are farther apart."""
 CHART_WIDTH, CHART_HEIGHT = 440.0, 300.0
 SCALE_MARGIN = 12.0
 MIDDLE, MAP_HALF = np.array([220.0, 130.0]), 100.0
@@ -126,7 +129,8 @@ def margins(drawing: Drawing, max_normal_force_n: float) -> tuple[Array, Array]:
     """Compute the largest force [N] and torque [mN m] resisted, (LATITUDES, LONGITUDES) each."""
     grasp, friction, body = drawing.grasp, drawing.friction, drawing.body
     largest = value_of(Quantity, max_normal_force_n, "max_normal_force_n")
-    if not force_closure(grasp, friction=friction).closed:
+    closure = force_closure(grasp, friction=friction)
+    if closure.forces is None:
         raise InputError(
             f"{grasp.id} is not in force closure at friction {friction:g}, so it resists nothing "
             f"in some direction; draw it at a friction above {grasp.critical_friction:.4g}"
@@ -134,12 +138,22 @@ def margins(drawing: Drawing, max_normal_force_n: float) -> tuple[Array, Array]:
     ways, still = directions_of_map().reshape(-1, 3), np.zeros((LATITUDES * LONGITUDES, 3))
     wrenches = np.vstack([np.hstack([ways, still]), np.hstack([still, body.radius * ways])])
     different, same = np.unique(np.round(wrenches, DIRECTION_DECIMALS), axis=0, return_inverse=True)
-    found = wrench_limits(
-        grasp, None, friction, different, max_normal_force=largest, center=body.center_of_mass
-    )
-    limits = np.array([each.limit for each in found])[same.reshape(-1)]
-    forces, torques = limits.reshape(2, LATITUDES, LONGITUDES)
+    arms = grasp.positions - body.center_of_mass
+    resisted = body_of(arms, grasp.normals, friction, largest, None, 0.0)
+    limits = _limits(resisted, resisted.in_frames(closure.forces, None), different)
+    forces, torques = limits[same].reshape(2, LATITUDES, LONGITUDES)
     return forces, MILLI * body.radius * torques
+
+
+def _limits(resisted: WrenchBody, balanced: Array, wrenches: Array) -> Array:
+    """Find multiples of wrenches (n, 6) that are resisted, up to a share `MAP_GAP` of the most."""
+    loads = resisted.about_middle(wrenches)
+    bounds = limit_bounds(resisted.bounded, balanced, loads, MAP_GAP)
+    limits, upper = resisted.max_normal_force * bounds.T
+    # the program itself where the bounds did not come together
+    for place in np.flatnonzero(~(upper - limits <= MAP_GAP * limits)):
+        limits[place] = limit_of(resisted, wrenches[place]).limit
+    return limits
 
 
 def _nodes() -> tuple[Array, Array]:

@@ -8,6 +8,7 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
+from pkgutil import resolve_name
 
 import numpy as np
 
@@ -31,7 +32,6 @@ from sim_validate.closure.replaying import Recorded, Replayed, WantedTrial, reco
 from sim_validate.commands import flags
 from sim_validate.commands.console import Reporter
 from sim_validate.commands.exit_codes import Exit
-from sim_validate.datasets.open_dataset import recorded_in_dataset
 from sim_validate.engine.setup import with_planned_radius
 from sim_validate.files.output_folders import alone_in
 from sim_validate.planning.asked_objects import grasp_with_id
@@ -165,10 +165,12 @@ def replay_trial(command: flags.ReplayFlags, reporter: Reporter) -> int:
             "give only one of them"
         )
     source = command.source
-    read = recorded_in_dataset if (source / MANIFEST).is_file() else recorded_in
-    recorded = read(
-        source, WantedTrial(command.grasp, command.control, command.trial, command.grasps)
-    )
+    wanted = WantedTrial(command.grasp, command.control, command.trial, command.grasps)
+    # the tables of datasets take a tenth of a second to declare, which no other command here needs
+    read = recorded_in if not (source / MANIFEST).is_file() else resolve_name(
+        "sim_validate.datasets.open_dataset:recorded_in_dataset"
+    )  # fmt: skip
+    recorded: Recorded = read(source, wanted)
     found = replayed(recorded, command.wrench)
     said = recorded.outcomes.get(found.name, recorded.others)
     _show(recorded, found, said, reporter)

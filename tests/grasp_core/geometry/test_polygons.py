@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 from grasp_core.geometry.polygons import (
     area_and_centroid,
     clip,
+    convex_hull,
     edge_rows,
     is_convex,
     merge_into_convex_pieces,
@@ -40,6 +41,12 @@ def test_edge_rows_hold_inside_and_fail_outside():
     assert (b - E @ [0.5, 0.5] > 0).all()
     assert (b - E @ [1.5, 0.5] < 0).sum() == 1
     np.testing.assert_allclose(np.linalg.norm(E, axis=1), 1.0)
+
+
+def test_a_hull_begins_at_the_first_of_its_corners_however_often_points_are_given():
+    points = np.vstack([[[0.5, 0.5]], np.repeat(SQUARE[[2, 0, 3, 1]], 3, axis=0), [[0.2, 0.1]]])
+    np.testing.assert_array_equal(convex_hull(points), SQUARE[[2, 3, 0, 1]])
+    assert (convex_hull(np.ones((5, 2))) == 1.0).all()
 
 
 def test_clipping_keeps_the_part_below_each_row():

@@ -8,7 +8,9 @@ import grasp_core as gc
 import sim_validate as sv
 from sim_validate.closure.replaying import Recorded, replayed
 from sim_validate.commands.exit_codes import Exit
+from sim_validate.engine import planned_loads
 from sim_validate.engine.held_or_let_go import Outcome
+from sim_validate.engine.rig import Rig
 from sim_validate.engine.setup import Agenda, NamedWrench, Setup
 from sim_validate.main import main
 from sim_validate.settings import Noise
@@ -45,6 +47,32 @@ def test_every_wrench_comes_out_bit_for_bit(tried):
         assert found.predicted_limit == trial.predicted_limit
         assert found.required_friction == trial.required_friction
     assert {trial.hold.outcome for trial in verdict.wrenches} == {Outcome.HELD, Outcome.SLIPPED}
+
+
+def test_only_the_load_that_is_simulated_is_planned(tried, monkeypatch):
+    planned, limit_of = [], planned_loads.limit_of
+    monkeypatch.setattr(
+        planned_loads, "limit_of", lambda *given: planned.append(given) or limit_of(*given)
+    )
+    known, verdict = tried
+    assert replayed(known, "-torque_z").predicted_limit == next(
+        each.predicted_limit for each in verdict.wrenches if each.name == "-torque_z"
+    )
+    assert len(planned) == 1
+
+
+def test_a_trial_that_holds_is_simulated_once_unless_its_figures_are_asked_for(tried, monkeypatch):
+    known, verdict = tried
+    traced, shorter = Rig.traced, []
+    monkeypatch.setattr(Rig, "traced", lambda *given: shorter.append(1) or traced(*given))
+    for trial in verdict.wrenches[-3:]:
+        found = replayed(known, trial.name, as_recorded=False)
+        assert found.hold.outcome is trial.hold.outcome
+        assert len(shorter) == (trial.hold.outcome is not Outcome.HELD)
+        shorter.clear()
+        assert replayed(known, trial.name).hold.outcome is trial.hold.outcome
+        assert shorter.pop()
+    assert {each.hold.outcome for each in verdict.wrenches[-3:]} == {Outcome.HELD, Outcome.SLIPPED}
 
 
 def test_so_do_negative_controls(tried):

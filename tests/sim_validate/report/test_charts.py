@@ -93,21 +93,34 @@ def test_a_map_covers_equal_areas_equally():
         assert area == pytest.approx(0.5 * step**2 * math.cos(latitude), rel=1e-2)
 
 
-def test_the_map_shows_what_is_resisted(wedge):
-    body, grasp = wedge
-    shown = margins(Drawing(body, grasp, FRICTION), 7.0)
+def shares_of_limits(body, grasp, friction):
+    """Every node of both maps over the limit that a program finds there."""
+    shown = margins(Drawing(body, grasp, friction), 7.0)
     ways = directions_of_map().reshape(-1, 3)
-    rng = np.random.default_rng(0)
-    for place in rng.integers(len(ways), size=6):
-        for kind, lever, unit in ((0, 1.0, 1.0), (3, body.radius, 1e3)):
-            wrench = np.zeros(6)
-            wrench[kind : kind + 3] = lever * ways[place]
-            limit = gc.wrench_limits(
-                grasp, None, FRICTION, [wrench], max_normal_force=7.0,
-                center=body.center_of_mass,
-            )[0].limit  # fmt: skip
-            value = np.ravel(shown[kind // 3])[place]
-            assert value == pytest.approx(unit * lever * limit, rel=1e-6)
+    still = np.zeros_like(ways)
+    wrenches = np.vstack([np.hstack([ways, still]), np.hstack([still, body.radius * ways])])
+    found = gc.wrench_limits(
+        grasp, None, friction, wrenches, max_normal_force=7.0, center=body.center_of_mass
+    )
+    units = np.repeat([1.0, 1e3 * body.radius], len(ways))
+    return np.ravel(shown) / (units * [each.limit for each in found])
+
+
+@pytest.mark.parametrize("above", [FRICTION, 1e-2, 1e-4])
+@pytest.mark.parametrize(
+    ("name", "family"),
+    [("wedge", "concurrent"), ("wedge", "pencil"), ("dodecahedron", "regulus")],
+)
+def test_the_map_shows_what_is_resisted(name, family, above):
+    """Far above the critical friction, and hardly above it."""
+    body, (grasp,) = grasps(name, FRICTION, 1, (family,), "tilted")
+    friction = grasp.critical_friction + above
+    np.testing.assert_allclose(shares_of_limits(body, grasp, friction), 1.0, rtol=2e-3)
+
+
+def test_where_bounds_do_not_meet_the_map_asks_the_program(wedge, monkeypatch):
+    monkeypatch.setattr("grasp_core.quality.limit_bounds.MOST_STEPS", 1)
+    np.testing.assert_allclose(shares_of_limits(*wedge, FRICTION), 1.0, rtol=1e-6)
 
 
 def test_without_closure_there_is_no_map(wedge):

@@ -140,3 +140,14 @@ def test_doctor_names_what_failed(monkeypatch, capsys):
     shown = capsys.readouterr()
     assert "FAILED critical friction" in " ".join(shown.out.split())
     assert "reinstall the package" in shown.err
+
+
+def test_reports_need_no_tables_of_datasets():
+    """They take a tenth of a second to declare."""
+    program = (
+        "import sys, sim_validate.report.command\nprint('sim_validate.datasets' in sys.modules)"
+    )
+    ran = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    )
+    assert ran.stdout == "False\n"
