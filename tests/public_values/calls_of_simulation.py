@@ -28,6 +28,7 @@ CALLS = [
         "grasp": VALUE | {"contacts of objects": [object()] * 4, "empty": (), "one": "grasp"},
         "fingers": optional(VALUE) | {"too large": scenes.FingerSettings(fingertip_radius_m=1.0)},
         "surface": optional(WORD),
+        "squeeze": optional(array(np.ones((4, 3)))) | {"of no push": np.zeros((4, 3))},
     }),
     Call("scenes.write_scene", lambda: {"scene": scene(), "path": "no/such/folder/a.xml"},
          succeeds_in="tests/scenes/mujoco/test_closure_scene.py"),

@@ -16,7 +16,7 @@ from sim_validate.closure.verdict import Verdicts, trace_arrays
 from sim_validate.commands.exit_codes import Exit
 from sim_validate.engine.closure_cases import ClosureCase
 from sim_validate.engine.held_or_let_go import Outcome
-from sim_validate.engine.known_cases import measured
+from sim_validate.engine.kept_gates import checked
 from sim_validate.engine.rig import Rig
 from sim_validate.engine.setup import Agenda, NamedWrench, Setup
 from tests.sim_validate.rigs import grasps, plan_with_a_bad_grasp
@@ -210,7 +210,7 @@ def test_workers_take_over_how_the_simulator_did(monkeypatch):
     monkeypatch.setattr("sim_validate.processes.workers.UNITS_PER_PROCESS", 1)
     body, found = grasps("wedge", 0.5, 2)
     asked = replace(WITHOUT_CONTROLS, critical_friction=False)
-    gate = measured(ClosureCase.of(Setup(), 0.5, body.radius))
+    gate = checked(ClosureCase.of(Setup().for_body(body), 0.5, body.radius))
     assert sv.validate(body, found[0], 0.5, agenda=asked).gate is gate
 
     def fail(_):
@@ -249,7 +249,7 @@ def test_any_error_about_one_grasp_is_its_outcome(monkeypatch):
     found = sv.validate_all(body, [elsewhere, odd, grasp], 0.5, agenda=WITHOUT_CONTROLS)
     assert [each.outcome for each in found] == [Outcome.ERROR, Outcome.ERROR, Outcome.HELD]
     assert "does not lie on face" in found[0].failures[0].hold.reason
-    kept = Verdicts.of(body, 0.5, measured(ClosureCase.of(Setup())), found).text()
+    kept = Verdicts.of(body, 0.5, checked(ClosureCase.of(Setup())), found).text()
     assert Verdicts.of_text(kept).verdicts[1].outcome is Outcome.ERROR
     monkeypatch.setattr(validating, "tested", lambda *_: (_ for _ in ()).throw(MemoryError))
     with pytest.raises(MemoryError):
