@@ -7,6 +7,9 @@ it if it rattles), is run again with steps of half the length. Up to the first c
 slips steps of the usual length are exact enough, so the second run goes on from shortly before. It
 ends where the object is farther than it may be: whatever comes later, it is lost.
 
+An object that is lighter than each fingertip may be thrown about when fingers close on it. Where it
+is, no step of the usual length says where the trial begins, and it is run again as a whole.
+
 The second run settles a trial if the object moves alike in both runs, up to where it is lost. It
 can settle a loss only if the loss is predicted, too. Either alone is not enough: objects rattle
 under loads of which the prediction knows nothing, and two runs that both rattle may fall together
@@ -46,7 +49,7 @@ NEAR_LOSS, NEAR_RATTLING = 0.5, 0.3
 """Share of the motion allowed above which short steps find that of a kept object that slips, and of
 one that rattles."""
 FEW_TOUCHES = 2
-"""Times that contacts come back to an object that does not rattle, at most."""
+"""Times that contacts let go of an object that does not rattle, at most."""
 SAME_MOTION = 0.1
 """Difference of two motions, in those allowed, up to which they agree: the one with half the steps
 is off by less than half of it then."""
@@ -70,8 +73,8 @@ def confirmed_trials(
         for trial, motion in motions.items()
     }
     left = {
-        trial: motions[trial] for trial, each in judged.items()
-        if each.fate != "stuck" and (not each.survived or _is_near(trial, motions[trial], settings))
+        trial: motion for trial, motion in motions.items()
+        if _is_thrown(trial, motion) or _is_doubtful(trial, judged[trial], motion, settings)
     }  # fmt: skip
     for short in confirming_benches(bench):
         if not left:
@@ -79,7 +82,7 @@ def confirmed_trials(
         last = short.chunk >= _short_steps(bench)
         tried = {
             trial: motion for trial, motion in left.items()
-            if last or judged[trial].survived or judged[trial].predicted_loss < 1.0
+            if last or _can_settle(trial, judged[trial], motion)
         }  # fmt: skip
         for trial, motion in (run_again(short, tried, settings) if tried else {}).items():
             first, runs = judged[trial], (motions[trial], motion)
@@ -111,12 +114,30 @@ def _used(motion: HeldMotion, begun: int, settings: ExecutionSettings) -> Array:
     return np.maximum.accumulate(np.maximum(moved / settings.most_m, turned / settings.most_rad))
 
 
-def _is_near(trial: Trial, motion: HeldMotion, settings: ExecutionSettings) -> bool:
-    """Say whether the motion of an object that was kept is near a limit, or may be rattle."""
+def _can_settle(trial: Trial, first: ExecutionTrial, motion: HeldMotion) -> bool:
+    """Say whether a second run with half the steps may settle a trial."""
+    return (first.survived or first.predicted_loss < 1.0) and not _is_thrown(trial, motion)
+
+
+def _is_thrown(trial: Trial, motion: HeldMotion) -> bool:
+    """Say whether fingers that close throw about an object that is lighter than each of them."""
+    if not trial.apart or motion.layout.object_kg >= motion.layout.tip_masses.min():
+        return False
+    touching = motion.pushes[: trial.begun + 1, :, 0] > 0.0
+    return bool(np.count_nonzero(touching[:-1] & ~touching[1:]) > FEW_TOUCHES)
+
+
+def _is_doubtful(
+    trial: Trial, first: ExecutionTrial, motion: HeldMotion, settings: ExecutionSettings
+) -> bool:
+    """Say whether an object slips and is lost, or comes near to a limit, which may be rattle."""
+    if first.fate == "stuck" or not first.survived:
+        return first.fate != "stuck"
     pushing = motion.pushes[trial.begun, :, 0]
     touching = motion.pushes[trial.begun :, pushing > LEAST_PUSHING * pushing.max(), 0] > 0.0
-    rattles = np.count_nonzero(touching[1:] & ~touching[:-1]) > FEW_TOUCHES
-    return _used(motion, trial.begun, settings)[-1] > (NEAR_RATTLING if rattles else NEAR_LOSS)
+    rattles = np.count_nonzero(touching[:-1] & ~touching[1:]) > FEW_TOUCHES
+    used = float(_used(motion, trial.begun, settings)[-1])
+    return used > (NEAR_RATTLING if rattles else NEAR_LOSS)
 
 
 def _judged(
@@ -178,7 +199,8 @@ def confirming_benches(bench: HeldBench) -> Iterator[HeldBench]:
     shortest = _short_steps(bench)
     for count in sorted({min(2 * bench.chunk, shortest), shortest}):
         if count > bench.chunk:
-            yield HeldBench(bench.scene, threads=bench.threads, step_s=bench.sample_s / count)
+            step_s = bench.sample_s / count
+            yield HeldBench(bench.scene, threads=bench.threads, lost_m=bench.lost_m, step_s=step_s)
 
 
 def _short_steps(bench: HeldBench) -> int:
@@ -189,12 +211,17 @@ def _short_steps(bench: HeldBench) -> int:
 def run_again(
     bench: HeldBench, motions: Mapping[Trial, HeldMotion], settings: ExecutionSettings
 ) -> dict[Trial, HeldMotion]:
-    """Simulate trials with short steps from before their trouble on, to where they are lost."""
+    """Simulate trials with short steps from before their trouble on, to where they are lost.
+
+    Where closing fingers throw the object about, the trouble begins with the trial.
+    """
+    whole = [trial for trial, motion in motions.items() if _is_thrown(trial, motion)]
     drives = {
         trial: replace(trial.drive, lost=_lost(motion, trial.begun, settings))
-        for trial, motion in motions.items()
-    }
-    return _gone_on(bench, motions, drives)
+        for trial, motion in motions.items() if trial not in whole
+    }  # fmt: skip
+    found = run_trials(bench, whole)
+    return found | (_gone_on(bench, motions, drives) if drives else {})
 
 
 def _gone_on(
