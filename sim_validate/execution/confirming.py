@@ -7,8 +7,9 @@ it if it rattles), is run again with steps of half the length. Up to the first c
 slips steps of the usual length are exact enough, so the second run goes on from shortly before. It
 ends where the object is farther than it may be: whatever comes later, it is lost.
 
-An object that is lighter than each fingertip may be thrown about when fingers close on it. Where it
-is, no step of the usual length says where the trial begins, and it is run again as a whole.
+An object that is lighter than each fingertip may be thrown about by fingers that close on it. Where
+one lets go of it again, nothing says from when on steps were too long: the whole trial is run again
+with steps of `FINE_S`.
 
 The second run settles a trial if the object moves alike in both runs, up to where it is lost. It
 can settle a loss only if the loss is predicted, too. Either alone is not enough: objects rattle
@@ -120,19 +121,21 @@ def _can_settle(trial: Trial, first: ExecutionTrial, motion: HeldMotion) -> bool
 
 
 def _is_thrown(trial: Trial, motion: HeldMotion) -> bool:
-    """Say whether fingers that close throw about an object that is lighter than each of them."""
+    """Say whether a finger that closes lets go of an object that is lighter than any of them."""
     if not trial.apart or motion.layout.object_kg >= motion.layout.tip_masses.min():
         return False
     touching = motion.pushes[: trial.begun + 1, :, 0] > 0.0
-    return bool(np.count_nonzero(touching[:-1] & ~touching[1:]) > FEW_TOUCHES)
+    return bool((touching[:-1] & ~touching[1:]).any())
 
 
 def _is_doubtful(
     trial: Trial, first: ExecutionTrial, motion: HeldMotion, settings: ExecutionSettings
 ) -> bool:
     """Say whether an object slips and is lost, or comes near to a limit, which may be rattle."""
-    if first.fate == "stuck" or not first.survived:
-        return first.fate != "stuck"
+    if first.fate == "stuck":
+        return False
+    if not first.survived:
+        return True
     pushing = motion.pushes[trial.begun, :, 0]
     touching = motion.pushes[trial.begun :, pushing > LEAST_PUSHING * pushing.max(), 0] > 0.0
     rattles = np.count_nonzero(touching[:-1] & ~touching[1:]) > FEW_TOUCHES
