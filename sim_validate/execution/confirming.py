@@ -8,13 +8,14 @@ slips steps of the usual length are exact enough, so the second run goes on from
 ends where the object is farther than it may be: whatever comes later, it is lost.
 
 An object that is lighter than each fingertip may be thrown about by fingers that close on it. Where
-one lets go of it again, nothing says from when on steps were too long: the whole trial is run again
-with steps of `FINE_S`.
+one lets go of it again, or the object is far lighter, nothing says from when on steps were too
+long: the whole trial is run again with steps of `FINE_S`.
 
 The second run settles a trial if the object moves alike in both runs, up to where it is lost. It
-can settle a loss only if the loss is predicted, too. Either alone is not enough: objects rattle
-under loads of which the prediction knows nothing, and two runs that both rattle may fall together
-by chance. What is left is run with steps of `FINE_S`, and their verdict counts.
+can settle a loss only if the object goes far beyond a limit and the loss is clearly predicted, too.
+Neither alone is enough: objects rattle under loads of which the prediction knows nothing, and two
+runs that both rattle may fall together by chance. What is left is run with steps of `FINE_S`, and
+their verdict counts.
 """
 
 import math
@@ -57,6 +58,11 @@ is off by less than half of it then."""
 SAMPLES_BEFORE = 4
 """Samples before the first trouble that is seen at which the second run begins: what happens within
 a sample is not seen."""
+FAR_LOST, SURE_LOSS = 2.0, 0.9
+"""Motion, in what is allowed, beyond which a loss may be settled by half the steps, and the largest
+predicted loss with which it may: contacts slide farther with longer steps."""
+FAR_LIGHTER = 0.1
+"""Mass of an object, in that of a fingertip, below which closing fingers always throw it about."""
 LEAST_STEP_S = 1e-5
 STICKING = 20.0
 """Friction of contacts that stick, relative to the true one."""
@@ -83,7 +89,7 @@ def confirmed_trials(
         last = short.chunk >= _short_steps(bench)
         tried = {
             trial: motion for trial, motion in left.items()
-            if last or _can_settle(trial, judged[trial], motion)
+            if last or _can_settle(trial, judged[trial], motion, settings)
         }  # fmt: skip
         for trial, motion in (run_again(short, tried, settings) if tried else {}).items():
             first, runs = judged[trial], (motions[trial], motion)
@@ -115,17 +121,26 @@ def _used(motion: HeldMotion, begun: int, settings: ExecutionSettings) -> Array:
     return np.maximum.accumulate(np.maximum(moved / settings.most_m, turned / settings.most_rad))
 
 
-def _can_settle(trial: Trial, first: ExecutionTrial, motion: HeldMotion) -> bool:
+def _can_settle(
+    trial: Trial, first: ExecutionTrial, motion: HeldMotion, settings: ExecutionSettings
+) -> bool:
     """Say whether a second run with half the steps may settle a trial."""
-    return (first.survived or first.predicted_loss < 1.0) and not _is_thrown(trial, motion)
+    if _is_thrown(trial, motion):
+        return False
+    far = float(_used(motion, trial.begun, settings)[-1]) > FAR_LOST
+    return first.survived or (far and first.predicted_loss < SURE_LOSS)
 
 
 def _is_thrown(trial: Trial, motion: HeldMotion) -> bool:
-    """Say whether a finger that closes lets go of an object that is lighter than any of them."""
-    if not trial.apart or motion.layout.object_kg >= motion.layout.tip_masses.min():
+    """Say whether closing fingers may throw the object about.
+
+    One lets go of an object that is lighter than any of them, or the object is far lighter.
+    """
+    relative = motion.layout.object_kg / motion.layout.tip_masses.min()
+    if not trial.apart or relative >= 1.0:
         return False
     touching = motion.pushes[: trial.begun + 1, :, 0] > 0.0
-    return bool((touching[:-1] & ~touching[1:]).any())
+    return relative < FAR_LIGHTER or bool((touching[:-1] & ~touching[1:]).any())
 
 
 def _is_doubtful(

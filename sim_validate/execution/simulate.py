@@ -258,8 +258,9 @@ class _Losing:
     def following(self, going: Indices, samples: Indices, joints: Array, _speeds: Array) -> Indices:
         """Give the sample after one for each trial that goes on (see `Bench.simulated`)."""
         with np.errstate(over="ignore", invalid="ignore"):  # where the simulator diverges
-            away = joints[going, :3] - joints[going, 7:10]
-            gone = np.linalg.norm(away, axis=1) > self.most_m[going]
+            away = joints[going, :3]
+            away -= joints[going, 7:10]
+            gone = np.sqrt(np.einsum("ni,ni->n", away, away)) > self.most_m[going]
             if self.turns_count:
                 now = joints[going]
                 palm = hinged(now[:, 10 : PALM_END + 1]).transpose(0, 2, 1)

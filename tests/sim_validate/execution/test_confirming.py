@@ -146,7 +146,7 @@ def test_a_loss_of_which_nothing_says_when_it_begins_is_run_again_as_a_whole():
 def test_half_the_steps_confirm_only_what_is_predicted_too():
     settings = sv.ExecutionSettings(1.5, trials=("stop",))
     bench, motions, _ = trials_on_a_bench(settings)
-    for loss, steps in ((0.9, 2 * bench.chunk), (1.1, bench.sample_s / FINE_S)):
+    for loss, steps in ((0.8, 2 * bench.chunk), (1.0, bench.sample_s / FINE_S)):
         predicted = dict.fromkeys(motions, (0.5, loss))
         found = confirmed_trials(bench, motions, predicted, settings)
         for trial in found.values():
