@@ -2,20 +2,16 @@
 
 Where contacts open and close between fingertips that push lightly, an object rattles. With steps of
 the usual length it bounces too much, and may fall where it would come to rest. So a trial whose
-object slips and is lost, or moves by more than `NEAR_LOSS` of what is allowed (`NEAR_RATTLING` of
-it if it rattles), is run again with steps of half the length. Up to the first contact that opens or
-slips steps of the usual length are exact enough, so the second run goes on from shortly before. It
-ends where the object is farther than it may be: whatever comes later, it is lost.
+object slips and is lost, or moves by more than `NEAR_LOSS` of what is allowed, is run again with
+shorter steps. Up to the first contact that opens or slips steps of the usual length are exact
+enough, so a second run goes on from shortly before. It ends where the object is farther than it may
+be: whatever comes later, it is lost. Only an object that is far lighter than fingertips, which
+throw it about when they close on it, is followed again from the start.
 
-An object that is lighter than each fingertip may be thrown about by fingers that close on it. Where
-one lets go of it again, or the object is far lighter, nothing says from when on steps were too
-long: the whole trial is run again with steps of `FINE_S`.
-
-The second run settles a trial if the object moves alike in both runs, up to where it is lost. It
-can settle a loss only if the object goes far beyond a limit and the loss is clearly predicted, too.
-Neither alone is enough: objects rattle under loads of which the prediction knows nothing, and two
-runs that both rattle may fall together by chance. What is left is run with steps of `FINE_S`, and
-their verdict counts.
+Steps of half the length settle a trial if the object moves alike in both runs, up to where it is
+lost; a loss only if the object goes far and the prediction shares it. Neither alone is enough:
+predictions know nothing of rattling, and two runs that both rattle may fall together by chance.
+What is left is run with steps of `FINE_S`, and their verdict counts.
 """
 
 import math
@@ -47,11 +43,8 @@ FINE_S = 1.25e-4
 """Length of steps whose verdict counts, whatever longer ones say, at most [s]."""
 FINER_STEPS = 4
 """Number of such steps in a step of the usual length, at least."""
-NEAR_LOSS, NEAR_RATTLING = 0.5, 0.3
-"""Share of the motion allowed above which short steps find that of a kept object that slips, and of
-one that rattles."""
-FEW_TOUCHES = 2
-"""Times that contacts let go of an object that does not rattle, at most."""
+NEAR_LOSS = 0.3
+"""Share of the motion allowed above which short steps find that of a kept object that slips."""
 SAME_MOTION = 0.1
 """Difference of two motions, in those allowed, up to which they agree: the one with half the steps
 is off by less than half of it then."""
@@ -61,8 +54,8 @@ a sample is not seen."""
 FAR_LOST, SURE_LOSS = 2.0, 0.9
 """Motion, in what is allowed, beyond which a loss may be settled by half the steps, and the largest
 predicted loss with which it may: contacts slide farther with longer steps."""
-FAR_LIGHTER = 0.1
-"""Mass of an object, in that of a fingertip, below which closing fingers always throw it about."""
+FAR_LIGHTER = 0.2
+"""Mass of an object, in that of a fingertip, below which closing fingers throw it about."""
 LEAST_STEP_S = 1e-5
 STICKING = 20.0
 """Friction of contacts that stick, relative to the true one."""
@@ -81,7 +74,7 @@ def confirmed_trials(
     }
     left = {
         trial: motion for trial, motion in motions.items()
-        if _is_thrown(trial, motion) or _is_doubtful(trial, judged[trial], motion, settings)
+        if _is_thrown(trial, bench) or _is_doubtful(judged[trial], settings)
     }  # fmt: skip
     for short in confirming_benches(bench):
         if not left:
@@ -89,7 +82,7 @@ def confirmed_trials(
         last = short.chunk >= _short_steps(bench)
         tried = {
             trial: motion for trial, motion in left.items()
-            if last or _can_settle(trial, judged[trial], motion, settings)
+            if last or _can_settle(trial, judged[trial], short, settings)
         }  # fmt: skip
         for trial, motion in (run_again(short, tried, settings) if tried else {}).items():
             first, runs = judged[trial], (motions[trial], motion)
@@ -109,53 +102,33 @@ def _agree(
     first, second = judged
     if first.survived != second.survived or "diverged" in {first.fate, second.fate}:
         return False
-    used = np.array([_used(run, trial.begun, settings) for run in runs])
+    moved, turned = np.transpose([moves(run, trial.begun) for run in runs], (1, 0, 2))
+    used = np.maximum(moved / settings.most_m, turned / settings.most_rad)
+    used = np.maximum.accumulate(used, axis=1)
     lost = np.flatnonzero((used > 1.0).any(axis=0))
     until = int(lost[0]) + 1 if len(lost) else used.shape[1]
     return float(np.abs(np.diff(used[:, :until], axis=0)).max()) <= SAME_MOTION
 
 
-def _used(motion: HeldMotion, begun: int, settings: ExecutionSettings) -> Array:
-    """Return the share of the motion allowed that an object has used up by each sample, (n,)."""
-    moved, turned = moves(motion, begun)
-    return np.maximum.accumulate(np.maximum(moved / settings.most_m, turned / settings.most_rad))
+def _share(trial: ExecutionTrial, settings: ExecutionSettings) -> float:
+    return max(trial.displacement_m / settings.most_m, trial.turn_rad / settings.most_rad)
+
+
+def _is_doubtful(first: ExecutionTrial, settings: ExecutionSettings) -> bool:
+    near = not first.survived or _share(first, settings) > NEAR_LOSS
+    return near and first.fate != "stuck"
 
 
 def _can_settle(
-    trial: Trial, first: ExecutionTrial, motion: HeldMotion, settings: ExecutionSettings
-) -> bool:
-    """Say whether a second run with half the steps may settle a trial."""
-    if _is_thrown(trial, motion):
-        return False
-    far = float(_used(motion, trial.begun, settings)[-1]) > FAR_LOST
-    return first.survived or (far and first.predicted_loss < SURE_LOSS)
+    trial: Trial, first: ExecutionTrial, half: HeldBench, settings: ExecutionSettings
+) -> bool:  # fmt: skip
+    clearly_lost = first.predicted_loss < SURE_LOSS and _share(first, settings) > FAR_LOST
+    return (first.survived or clearly_lost) and not _is_thrown(trial, half)
 
 
-def _is_thrown(trial: Trial, motion: HeldMotion) -> bool:
-    """Say whether closing fingers may throw the object about.
-
-    One lets go of an object that is lighter than any of them, or the object is far lighter.
-    """
-    relative = motion.layout.object_kg / motion.layout.tip_masses.min()
-    if not trial.apart or relative >= 1.0:
-        return False
-    touching = motion.pushes[: trial.begun + 1, :, 0] > 0.0
-    return relative < FAR_LIGHTER or bool((touching[:-1] & ~touching[1:]).any())
-
-
-def _is_doubtful(
-    trial: Trial, first: ExecutionTrial, motion: HeldMotion, settings: ExecutionSettings
-) -> bool:
-    """Say whether an object slips and is lost, or comes near to a limit, which may be rattle."""
-    if first.fate == "stuck":
-        return False
-    if not first.survived:
-        return True
-    pushing = motion.pushes[trial.begun, :, 0]
-    touching = motion.pushes[trial.begun :, pushing > LEAST_PUSHING * pushing.max(), 0] > 0.0
-    rattles = np.count_nonzero(touching[:-1] & ~touching[1:]) > FEW_TOUCHES
-    used = float(_used(motion, trial.begun, settings)[-1])
-    return used > (NEAR_RATTLING if rattles else NEAR_LOSS)
+def _is_thrown(trial: Trial, bench: HeldBench) -> bool:
+    layout = bench.scene.layout
+    return trial.apart and layout.object_kg < FAR_LIGHTER * float(layout.tip_masses.min())
 
 
 def _judged(
@@ -229,11 +202,8 @@ def _short_steps(bench: HeldBench) -> int:
 def run_again(
     bench: HeldBench, motions: Mapping[Trial, HeldMotion], settings: ExecutionSettings
 ) -> dict[Trial, HeldMotion]:
-    """Simulate trials with short steps from before their trouble on, to where they are lost.
-
-    Where closing fingers throw the object about, the trouble begins with the trial.
-    """
-    whole = [trial for trial, motion in motions.items() if _is_thrown(trial, motion)]
+    """Simulate trials with short steps from before their trouble on, to where they are lost."""
+    whole = [trial for trial in motions if _is_thrown(trial, bench)]
     drives = {
         trial: replace(trial.drive, lost=_lost(motion, trial.begun, settings))
         for trial, motion in motions.items() if trial not in whole

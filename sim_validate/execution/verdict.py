@@ -78,8 +78,8 @@ class ExecutionTrial(Declared):
     how far away slip stayed. A slip under a load that follows the whole weight shows as one."""
     step_s: Quantity
     """Length of the shortest steps that the simulator took: an object that slips and is lost, or
-    moves by more than half of what is allowed (if it rattles, a third), is simulated again with
-    half the steps, and with steps of 1/8 ms where that does not settle it [s]."""
+    moves by more than 0.3 of what is allowed, is simulated again with steps of half the length, and
+    with steps of 1/8 ms where that does not settle it [s]."""
     starts_closed: bool | None = None
     """Whether fingers first meet a misplaced object in force closure, before they squeeze; null for
     other trials, and where it is too close to decide."""
