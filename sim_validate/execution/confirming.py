@@ -73,18 +73,18 @@ def confirmed_trials(
         for trial, motion in motions.items()
     }
     left = {
-        trial: motion for trial, motion in motions.items()
-        if _is_thrown(trial, bench) or _is_doubtful(judged[trial], settings)
+        trial: motions[trial] for trial, each in judged.items()
+        if _is_thrown(trial, bench)
+        or (each.fate != "stuck" and (not each.survived or _share(each, settings) > NEAR_LOSS))
     }  # fmt: skip
     for short in confirming_benches(bench):
         if not left:
             break
         last = short.chunk >= _short_steps(bench)
-        tried = {
-            trial: motion for trial, motion in left.items()
-            if last or _can_settle(trial, judged[trial], short, settings)
-        }  # fmt: skip
-        for trial, motion in (run_again(short, tried, settings) if tried else {}).items():
+        clear = {
+            t: m for t, m in left.items() if last or _can_settle(t, judged[t], bench, settings)
+        }
+        for trial, motion in run_again(short, clear, settings).items():
             first, runs = judged[trial], (motions[trial], motion)
             found = _judged(trial, motion, predicted[trial], short, settings, settled=True)
             if last or _agree(trial, (first, found), runs, settings):
@@ -104,26 +104,20 @@ def _agree(
         return False
     moved, turned = np.transpose([moves(run, trial.begun) for run in runs], (1, 0, 2))
     used = np.maximum(moved / settings.most_m, turned / settings.most_rad)
-    used = np.maximum.accumulate(used, axis=1)
-    lost = np.flatnonzero((used > 1.0).any(axis=0))
-    until = int(lost[0]) + 1 if len(lost) else used.shape[1]
-    return float(np.abs(np.diff(used[:, :until], axis=0)).max()) <= SAME_MOTION
+    apart = np.abs(np.diff(np.maximum.accumulate(used, axis=1), axis=0))[0]
+    lost = (used > 1.0).any(axis=0)
+    return float(apart[: int(lost.argmax()) + 1 if lost.any() else None].max()) <= SAME_MOTION
 
 
 def _share(trial: ExecutionTrial, settings: ExecutionSettings) -> float:
     return max(trial.displacement_m / settings.most_m, trial.turn_rad / settings.most_rad)
 
 
-def _is_doubtful(first: ExecutionTrial, settings: ExecutionSettings) -> bool:
-    near = not first.survived or _share(first, settings) > NEAR_LOSS
-    return near and first.fate != "stuck"
-
-
 def _can_settle(
-    trial: Trial, first: ExecutionTrial, half: HeldBench, settings: ExecutionSettings
+    trial: Trial, first: ExecutionTrial, bench: HeldBench, settings: ExecutionSettings
 ) -> bool:  # fmt: skip
     clearly_lost = first.predicted_loss < SURE_LOSS and _share(first, settings) > FAR_LOST
-    return (first.survived or clearly_lost) and not _is_thrown(trial, half)
+    return (first.survived or clearly_lost) and not _is_thrown(trial, bench)
 
 
 def _is_thrown(trial: Trial, bench: HeldBench) -> bool:
@@ -183,10 +177,7 @@ def run_trials(bench: HeldBench, trials: Sequence[Trial]) -> dict[Trial, HeldMot
 
 
 def confirming_benches(bench: HeldBench) -> Iterator[HeldBench]:
-    """Yield benches of the same scene with half the steps, and with those whose verdict counts.
-
-    None are shorter than the latter; where those of the bench are as short, there are none.
-    """
+    """Yield benches of the scene with half the steps, and with short ones, if theirs are longer."""
     shortest = _short_steps(bench)
     for count in sorted({min(2 * bench.chunk, shortest), shortest}):
         if count > bench.chunk:
@@ -208,14 +199,15 @@ def run_again(
         trial: replace(trial.drive, lost=_lost(motion, trial.begun, settings))
         for trial, motion in motions.items() if trial not in whole
     }  # fmt: skip
-    found = run_trials(bench, whole)
-    return found | (_gone_on(bench, motions, drives) if drives else {})
+    return run_trials(bench, whole) | _gone_on(bench, motions, drives)
 
 
 def _gone_on(
     bench: HeldBench, motions: Mapping[Trial, HeldMotion], drives: Mapping[Trial, TrialDrive]
 ) -> dict[Trial, HeldMotion]:
     """Simulate other drives of trials from before their trouble on, which alters nothing before."""
+    if not drives:
+        return {}
     begins = {trial: _begin(trial, motions[trial]) for trial in drives}
     rests, starts = list[TrialDrive](), list[Array]()
     for trial, begin in begins.items():
@@ -260,7 +252,7 @@ def with_first_slips(
         if each.fate in {"slipped", "dropped"}
         and (trial.weighing or each.kind == "lift" or each.simulated_first_slip >= FULL_LOAD)
     }
-    for trial, motion in (_gone_on(bench, motions, rough) if rough else {}).items():
+    for trial, motion in _gone_on(bench, motions, rough).items():
         multiple = sticking_multiple(motion, trial.drive, friction, trial.begun)
         known[trial] = replace(known[trial], simulated_first_slip=min(multiple, 1.0))
     return tuple(known.values())
