@@ -5,8 +5,8 @@ the usual length it bounces too much, and may fall where it would come to rest. 
 object slips and is lost, or moves by more than `NEAR_LOSS` of what is allowed, is run again with
 shorter steps. Up to the first contact that opens or slips steps of the usual length are exact
 enough, so a second run goes on from shortly before. It ends where the object is farther than it may
-be: whatever comes later, it is lost. Only an object that is far lighter than fingertips, which
-throw it about when they close on it, is followed again from the start.
+be: whatever comes later, it is lost. Only an object that is thrown about when fingers close on it,
+far lighter than they or lighter and let go again by one, is followed again from the start.
 
 Steps of half the length settle a trial if the object moves alike in both runs, up to where it is
 lost; a loss only if the object goes far and the prediction shares it. Neither alone is enough:
@@ -54,8 +54,8 @@ a sample is not seen."""
 FAR_LOST, SURE_LOSS = 2.0, 0.9
 """Motion, in what is allowed, beyond which a loss may be settled by half the steps, and the largest
 predicted loss with which it may: contacts slide farther with longer steps."""
-FAR_LIGHTER = 0.2
-"""Mass of an object, in that of a fingertip, below which closing fingers throw it about."""
+FAR_LIGHTER = 0.1
+"""Mass of an object, in that of a fingertip, below which closing fingers always throw it about."""
 LEAST_STEP_S = 1e-5
 STICKING = 20.0
 """Friction of contacts that stick, relative to the true one."""
@@ -74,7 +74,7 @@ def confirmed_trials(
     }
     left = {
         trial: motions[trial] for trial, each in judged.items()
-        if _is_thrown(trial, bench)
+        if _is_thrown(trial, motions[trial])
         or (each.fate != "stuck" and (not each.survived or _share(each, settings) > NEAR_LOSS))
     }  # fmt: skip
     for short in confirming_benches(bench):
@@ -114,15 +114,18 @@ def _share(trial: ExecutionTrial, settings: ExecutionSettings) -> float:
 
 
 def _can_settle(
-    trial: Trial, first: ExecutionTrial, bench: HeldBench, settings: ExecutionSettings
+    trial: Trial, first: ExecutionTrial, motion: HeldMotion, settings: ExecutionSettings
 ) -> bool:  # fmt: skip
     clearly_lost = first.predicted_loss < SURE_LOSS and _share(first, settings) > FAR_LOST
-    return (first.survived or clearly_lost) and not _is_thrown(trial, bench)
+    return (first.survived or clearly_lost) and not _is_thrown(trial, motion)
 
 
-def _is_thrown(trial: Trial, bench: HeldBench) -> bool:
-    layout = bench.scene.layout
-    return trial.apart and layout.object_kg < FAR_LIGHTER * float(layout.tip_masses.min())
+def _is_thrown(trial: Trial, motion: HeldMotion) -> bool:
+    relative = motion.layout.object_kg / float(motion.layout.tip_masses.min())
+    if not trial.apart or relative >= 1.0:
+        return False
+    touching = motion.pushes[: trial.begun + 1, :, 0] > 0.0
+    return relative < FAR_LIGHTER or bool((touching[:-1] & ~touching[1:]).any())
 
 
 def _judged(
@@ -194,7 +197,7 @@ def run_again(
     bench: HeldBench, motions: Mapping[Trial, HeldMotion], settings: ExecutionSettings
 ) -> dict[Trial, HeldMotion]:
     """Simulate trials with short steps from before their trouble on, to where they are lost."""
-    whole = [trial for trial in motions if _is_thrown(trial, bench)]
+    whole = [trial for trial, motion in motions.items() if _is_thrown(trial, motion)]
     drives = {
         trial: replace(trial.drive, lost=_lost(motion, trial.begun, settings))
         for trial, motion in motions.items() if trial not in whole
