@@ -203,7 +203,8 @@ class _Process:
         self.program = subprocess.Popen(
             [sys.executable, "-P", "-m", "grasp_core.processes"],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
-            env={**os.environ, "PYTHONPATH": os.pathsep.join(places)},
+            # processes share the processors: threads of BLAS would only wait for each other
+            env={"OPENBLAS_NUM_THREADS": "1", **os.environ, "PYTHONPATH": os.pathsep.join(places)},
         )  # fmt: skip
 
     def ask(self, function: Callable[[Any], Any], task: Any) -> bytes:

@@ -85,6 +85,7 @@ def near(name: str, ratio: float | None, tolerance: float) -> GateCheck:
     return GateCheck(name, math.nan if ratio is None else ratio, 1.0 - tolerance, 1.0 + tolerance)
 
 
+@lru_cache(maxsize=16)
 def sized(name: str, radius_m: float) -> Polyhedron:
     """Scale an example object to a size, with its centre of mass at the origin."""
     example = example_object(name)

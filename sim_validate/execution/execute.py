@@ -25,7 +25,7 @@ from grasp_core.values import Contact, Grasp
 from scenes.mujoco_options import PhysicsSettings
 from sim_validate.engine.kept_gates import checked
 from sim_validate.engine.setup import MOST_THREADS
-from sim_validate.execution.confirming import confirmed_trials, with_first_slips
+from sim_validate.execution.confirming import confirmed_trials, run_trials, with_first_slips
 from sim_validate.execution.enough import NoSqueezeError, found_enough
 from sim_validate.execution.held_cases import cases_of
 from sim_validate.execution.holders import Holder, SpringFingers, planned
@@ -91,12 +91,13 @@ def execution_of(
     predicted = dict(zip(trials, dynamics.losses(trials, settings), strict=True))
     lost_m = max(OUT_OF_REACH * holder.body.radius, 2.0 * settings.most_m)
     bench = HeldBench(scene, threads=threads, lost_m=lost_m)
-    judged = with_first_slips(bench, confirmed_trials(bench, predicted, settings))
+    motions = run_trials(bench, trials)
+    judged = confirmed_trials(bench, motions, predicted, settings)
     found = Execution(
         mass_kg=settings.object_kg,
         squeeze=best.grip.squeeze,
         load_multiple=best.scale,
-        trials=judged,
+        trials=with_first_slips(bench, motions, judged),
         controls=run_controls(bench, best, dynamics.lowest_frequency),
         skipped=skipped,
         physics=scene.physics,

@@ -3,9 +3,8 @@
 A box between four fingers moves as is known in closed form. With the pushes N, stiffness k,
 friction mu, masses m of the box and m_t of a fingertip, and radius rho of the fingertips:
 
-* a weight along z makes the box slip at 4 mu N, and so does the weight together with an upward
-  acceleration a of the palm, at m (g + a) = 4 mu N;
-* four fingers that all push along x let the box slip at 4 mu N in any direction across x;
+* four fingers that all push along x let the box slip at 4 mu N in any direction across x, under a
+  weight together with an acceleration a of the palm against it, at m (g + a) = 4 mu N;
 * a load F along any axis moves the box by F / (4 k) against the palm, as the four springs are as
   stiff in all directions, and a palm in uniform motion changes neither this motion nor the forces;
 * a load F that comes and goes suddenly leaves F - m x'' to the contacts, with the step response of
@@ -36,6 +35,7 @@ surface, so each contact must carry its own.
 
 import importlib
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -120,6 +120,11 @@ class HeldCase:
         return LIGHT_LOAD * BOX_FINGERS * self.push * mu / (math.sqrt(2.0) + mu)
 
     @property
+    def lifted_n(self) -> float:
+        """The weight that is lifted from a table [N]: all of it, if the fingers hold as much."""
+        return min(self.object_kg * GRAVITY_M_PER_S2, self.light_n)
+
+    @property
     def moving_kg(self) -> float:
         """What moves with the box: its own mass and that of the fingertips [kg]."""
         return self.object_kg + BOX_FINGERS * self.tip_mass_kg
@@ -153,8 +158,7 @@ class HeldCase:
 
     def checks(self) -> tuple[GateCheck, ...]:
         """Measure all figures."""
-        faces = (*face_checks(self, "box"), *face_checks(self, "l-bracket"))
-        return (*held_box_checks(self), *free_box_checks(self), struck_box_check(self), *faces)
+        return (*box_checks(self), *face_checks(self, "box"), *face_checks(self, "l-bracket"))
 
     def scene(
         self, body: Polyhedron, contacts: list[Contact], squeeze: Array, tip_radius_m: float
@@ -211,9 +215,9 @@ PERIODS = 2.0
 RADIANS = 0.8
 """Angle of a ring between two of the points that its frequency is taken from, at most [rad]."""
 RISING = 0.5
-"""Part of the load of slip that is the palm's acceleration, where it rises."""
-SPEED_M_PER_S = 1.0
-"""Speed of a palm in uniform motion, which must change nothing."""
+"""Part of the load of slip that is the palm's acceleration."""
+SPEED_M_PER_S, MOVING = 1.0, 20
+"""Speed of a palm in uniform motion, and its samples, in which it must change nothing."""
 CREEP = 0.2
 """Largest creep of contacts that stick in the longest trial, over what counts as slipped."""
 JUMP, JUMP_SHARE = 6, 0.4
@@ -224,66 +228,70 @@ SETTLING_TIMES = 8.0
 """Time that a held load stays before it is in the damper's own times c / k."""
 
 
-def held_box_checks(case: HeldCase) -> tuple[GateCheck, ...]:
-    """Check the load of slip, the deflection, the frequencies, and a palm in uniform motion."""
+def box_checks(case: HeldCase) -> tuple[GateCheck, ...]:
+    """Check the box between its fingers, held, struck and ringing, and without them."""
     bench = HeldBench(case.held_scene())
-    _, start = bench.settled(paths.closing(SQUEEZE_SETTLE_S))
-    ramps = [_ramp(case, 0.0), _ramp(case, RISING)]
+    squeezed, *freed = bench.run([paths.closing(SQUEEZE_SETTLE_S), *_free(case, bench)])
+    start = squeezed.states[-1]
+    held = (*_held(case), _blow(case))
+    *motions, struck = bench.run(held, start)
+    return (
+        _slip(case),
+        *_held_checks(case, motions),
+        *_rings(replace(case, damping_ratio=RING_DAMPING), start),
+        *_free_checks(case, freed),
+        _struck_check(bench, held[-1], struck, start),
+    )
+
+
+def _held(case: HeldCase) -> tuple[TrialDrive, ...]:
+    """Return drives of a load that stays, the same for a while in a moving palm, and of a jump."""
     lag = SETTLING_TIMES * 2.0 * case.damping_ratio / case.frequency
     share = np.concatenate([case.rise(), np.ones(paths.samples(lag) + _period(case))])
     wrenches = case.light_n * share[:, None] * np.repeat([1.0, 0.0], 3)
     still = replace(idle(len(share)), wrenches=wrenches, shares=share)
-    moving = replace(still, velocity=SPEED_M_PER_S * np.array([0.6, 0.8, 0.0]))
+    moving = replace(still.rows(slice(MOVING)), velocity=SPEED_M_PER_S * np.array([0.6, 0.8, 0.0]))
     jump = np.zeros((2 * JUMP, 6))  # there at once, and suddenly gone
     jump[:JUMP, 0] = JUMP_SHARE * case.light_n
-    sudden = replace(idle(2 * JUMP), wrenches=jump)
-    motions = bench.run([*ramps, still, moving, sudden], start)
-    friction = bench.scene.layout.friction
-    slips = [
-        (1.0 + WINDOW) * outcome(motion, drive, friction).first_slip
-        for motion, drive in zip(motions[:2], ramps, strict=True)
-    ]
-    rest, uniform = motions[2:4]
+    return still, moving, replace(idle(2 * JUMP), wrenches=jump)
+
+
+def _held_checks(case: HeldCase, motions: Sequence[HeldMotion]) -> tuple[GateCheck, ...]:
+    """Check the deflection, a palm in uniform motion, creep, and contact forces after a jump."""
+    rest, uniform, jumped = motions
     spring = case.light_n / (BOX_FINGERS * case.stiffness_n_per_m)
     gone = rest.shifts[-_period(case) :].mean(axis=0) / spring
-    apart = float(np.abs(uniform.shifts - rest.shifts).max()) / spring
-    pulled = float(np.abs(uniform.pushes - rest.pushes).max()) / case.light_n
+    first = rest.rows(slice(len(uniform.moved)))
+    apart = float(np.abs(uniform.shifts - first.shifts).max()) / spring
+    pulled = float(np.abs(uniform.pushes - first.pushes).max()) / case.light_n
     return (
-        ratio_check("weight at which a held box slips, over 4 mu N", motions[0], slips[0]),
-        _oblique(case),
-        ratio_check("m (g + a) at which a held box slips in a palm that rises, over 4 mu N",
-                    motions[1], slips[1]),
-        *(ratio_check(f"deflection along {axis}, over load / 4 k", motions[2], ratio)
+        *(ratio_check(f"deflection along {axis}, over load / 4 k", rest, ratio)
           for axis, ratio in zip("xyz", gone.tolist(), strict=True)),
-        bound_check("motion that uniform motion of the palm adds, over the deflection", motions[3],
+        bound_check("motion that uniform motion of the palm adds, over the deflection", uniform,
                     apart),
-        bound_check("contact force that uniform motion of the palm adds, over the load", motions[3],
+        bound_check("contact force that uniform motion of the palm adds, over the load", uniform,
                     pulled),
-        _creep(case, motions[2]),
-        _jumps(case, motions[4]),
-        *_rings(replace(case, damping_ratio=RING_DAMPING)),
+        _creep(case, rest),
+        _jumps(case, jumped),
     )  # fmt: skip
 
 
-def _oblique(case: HeldCase) -> GateCheck:
-    bench = HeldBench(case.clamped_scene())
+def _slip(case: HeldCase) -> GateCheck:
+    """Check the weight, a part of it as the palm's acceleration, at which a clamped box slips."""
+    bench, low = HeldBench(case.clamped_scene()), (1.0 - WINDOW) / (1.0 + WINDOW)
     _, start = bench.settled(paths.closing(SQUEEZE_SETTLE_S))
-    drive = _ramp(case, 0.0, np.array([0.0, math.sin(OBLIQUE), -math.cos(OBLIQUE)]))
-    (motion,) = bench.run([drive], start)
-    found = outcome(motion, drive, bench.scene.layout.friction)
-    name = "weight at which a box slips obliquely across its contacts, over 4 mu N"
-    return ratio_check(name, motion, (1.0 + WINDOW) * found.first_slip)
-
-
-def _ramp(case: HeldCase, rising: float, way: Array = DOWN) -> TrialDrive:
-    """Return the drive in which a weight grows past slip, a part of it as the palm's rise."""
-    low = (1.0 - WINDOW) / (1.0 + WINDOW)
     share = np.concatenate([low * case.rise(), low + (1.0 - low) * case.rise(0.5 * SLOW_RISE)])
     slip_n = BOX_FINGERS * case.friction * case.push  # by statics
+    way = np.array([0.0, math.sin(OBLIQUE), -math.cos(OBLIQUE)])
     whole = (1.0 + WINDOW) * slip_n / case.object_kg * share[:, None] * way
-    drive = replace(idle(len(share)), gravity=(1.0 - rising) * whole, shares=share)
-    accelerations = np.hstack([-rising * whole, np.zeros((len(share), 3))])
-    return replace(drive, accelerations=accelerations)
+    accelerations = np.hstack([-RISING * whole, np.zeros((len(share), 3))])
+    drive = replace(
+        idle(len(share)), gravity=(1.0 - RISING) * whole, accelerations=accelerations, shares=share
+    )
+    (motion,) = bench.run([drive], start)
+    found = outcome(motion, drive, bench.scene.layout.friction)
+    name = "m (g + a) at which a box slips obliquely across its contacts, over 4 mu N"
+    return ratio_check(name, motion, (1.0 + WINDOW) * found.first_slip)
 
 
 def _creep(case: HeldCase, motion: HeldMotion) -> GateCheck:
@@ -322,10 +330,9 @@ def _period(case: HeldCase) -> int:
     return max(2, paths.samples(2.0 * math.pi / case.frequency))
 
 
-def _rings(case: HeldCase) -> list[GateCheck]:
+def _rings(case: HeldCase, start: Array) -> list[GateCheck]:
     """Knock the box along and about all axes at once, and check how fast each of them rings."""
     scene = case.held_scene()
-    _, start = HeldBench(scene).settled(paths.closing(SQUEEZE_SETTLE_S))
     stiff, mass, damper = _modes(case, np.diag(scene.layout.inertia_kg_m2))
     undamped = np.sqrt(stiff / mass)
     bench = HeldBench(scene, sample_s=min(SAMPLE_S, RADIANS / float(undamped.max())))
@@ -374,8 +381,8 @@ def ring_frequency(points: Array, about: float, sample_s: float) -> float:
     return math.acos(0.5 * p / math.sqrt(q)) / (stride * sample_s)
 
 
-FALL_S = 0.4
-"""Time of the fall: steps of h make it h / FALL_S longer, a third of a percent at 1.25 ms [s]."""
+FALL_S = 0.2
+"""Time of the fall: steps of h make it h / FALL_S longer, 0.6 percent at 1.25 ms [s]."""
 FLIGHT_S = 0.2
 """Time in which the box flies after a knock [s]."""
 KNOCK_RAD_PER_S = 2.0
@@ -386,30 +393,39 @@ RAISED = 4.0
 """Height of the lift, relative to the way by which the springs give under the weight."""
 
 
-def free_box_checks(case: HeldCase) -> tuple[GateCheck, ...]:
-    """Check the fall, the velocities after a knock, and what a table carries."""
-    bench = HeldBench(case.held_scene())
+def _free(case: HeldCase, bench: HeldBench) -> tuple[TrialDrive, ...]:
+    """Return drives of a fall and a knock without fingers, and of a lift from a table."""
     steps, flight = round(FALL_S / SAMPLE_S), round(FLIGHT_S / SAMPLE_S)
-    speed_m_per_s = case.radius_m / FLIGHT_S  # takes the box by one radius, not to the fingers
     wrenches = np.zeros((flight, 6))
-    wrenches[0, 0] = case.object_kg * speed_m_per_s / SAMPLE_S
+    wrenches[0, 0] = case.object_kg * case.radius_m / FLIGHT_S / SAMPLE_S
     wrenches[0, 5] = bench.scene.layout.inertia_kg_m2[2, 2] * KNOCK_RAD_PER_S / SAMPLE_S
-    fall, knock = bench.run(
-        [
-            _apart(case, bench, replace(idle(steps), gravity=np.tile(WEIGHT_M_PER_S2, (steps, 1)))),
-            _apart(case, bench, replace(idle(flight), wrenches=wrenches)),
-        ]
-    )
-    fallen = float(fall.moved[-1] @ DOWN) / (0.5 * GRAVITY_M_PER_S2 * (steps * SAMPLE_S) ** 2)
+    fall = replace(idle(steps), gravity=np.tile(WEIGHT_M_PER_S2, (steps, 1)))
+    knock = replace(idle(flight), wrenches=wrenches)
+    lift, _ = _lift(case)
+    return _apart(case, bench, fall), _apart(case, bench, knock), lift
+
+
+def _free_checks(case: HeldCase, motions: Sequence[HeldMotion]) -> tuple[GateCheck, ...]:
+    """Check the fall, the velocities after a knock, and what a table carries."""
+    fall, knock, lifted = motions
+    speed_m_per_s = case.radius_m / FLIGHT_S  # takes the box by one radius, not to the fingers
+    seconds = len(fall.moved) * SAMPLE_S
+    fallen = float(fall.moved[-1] @ DOWN) / (0.5 * GRAVITY_M_PER_S2 * seconds**2)
     time = (len(knock.moved) - 2) * SAMPLE_S
     speed = float(knock.moved[-1, 0] - knock.moved[1, 0]) / time
     turns = 2.0 * np.arctan2(knock.turned[:, 3], knock.turned[:, 0])
     rate = float(turns[-1] - turns[1]) / time
+    weight, begun = case.lifted_n, _lift(case)[1]
+    still = paths.samples(0.5 * paths.STILL_S)
+    carried = -(lifted.table @ DOWN) / weight
+    before = float(carried[begun - still : begun].mean())
+    after = float(np.abs(carried[-still:]).max())
     return (
         ratio_check("fall of a box that nothing holds, over g t^2 / 2", fall, fallen),
         ratio_check("velocity after a knock, over J / m", knock, speed / speed_m_per_s),
         ratio_check("rate of turning after a knock, over L / I", knock, rate / KNOCK_RAD_PER_S),
-        *_lifted(case, bench),
+        ratio_check("weight that a table carries before a lift, over m g", lifted, before),
+        bound_check("weight that a table carries after a lift, over m g", lifted, after),
     )
 
 
@@ -422,21 +438,13 @@ def _apart(case: HeldCase, bench: HeldBench, drive: TrialDrive) -> TrialDrive:
     return replace(drive, grasping=np.zeros(len(drive)), reached=reached, table=above)
 
 
-def _lifted(case: HeldCase, bench: HeldBench) -> tuple[GateCheck, GateCheck]:
-    weight = min(case.object_kg * GRAVITY_M_PER_S2, case.light_n)
-    height = RAISED * weight / (BOX_FINGERS * case.stiffness_n_per_m)
+def _lift(case: HeldCase) -> tuple[TrialDrive, int]:
+    """Return the drive of a lift from a table, and the sample in which it begins."""
+    height = RAISED * case.lifted_n / (BOX_FINGERS * case.stiffness_n_per_m)
     drive, begun = paths.lift(-DOWN, height, SAMPLE_S * len(case.rise()))
-    share = weight / (case.object_kg * GRAVITY_M_PER_S2)
+    share = case.lifted_n / (case.object_kg * GRAVITY_M_PER_S2)
     table = TablePlane(case.halves[2] * DOWN, -DOWN)
-    (motion,) = bench.run([replace(drive, gravity=share * drive.gravity, table=table)])
-    still = paths.samples(0.5 * paths.STILL_S)
-    carried = -(motion.table @ DOWN) / weight
-    before = float(carried[begun - still : begun].mean())
-    after = float(np.abs(carried[-still:]).max())
-    return (
-        ratio_check("weight that a table carries before a lift, over m g", motion, before),
-        bound_check("weight that a table carries after a lift, over m g", motion, after),
-    )
+    return replace(drive, gravity=share * drive.gravity, table=table), begun
 
 
 BLOW = 1.2
@@ -450,18 +458,16 @@ CHANGED = 0.25
 by 0.4 and more."""
 
 
-def struck_box_check(case: HeldCase) -> GateCheck:
+def _struck_check(
+    bench: HeldBench, blow: TrialDrive, struck: HeldMotion, start: Array
+) -> GateCheck:
     """Check how much short steps change the motion of a box that is struck off its fingers."""
-    scene, blow = case.held_scene(), _blow(case)
-    step_s = held_physics(scene.layout).timestep / STEPS_SHORTER
-    motions = list[HeldMotion]()
-    for bench in (HeldBench(scene), HeldBench(scene, step_s=step_s)):
-        _, start = bench.settled(paths.closing(SQUEEZE_SETTLE_S))
-        motions += bench.run([blow], start)
-    here, there = (motion.shifts for motion in motions)
-    changed = float(np.abs(here - there).max()) / max(float(np.abs(there).max()), SMALLEST)
+    step_s = held_physics(bench.scene.layout).timestep / STEPS_SHORTER
+    (short,) = HeldBench(bench.scene, step_s=step_s).run([blow], start)
+    changed = float(np.abs(struck.shifts - short.shifts).max())
+    changed /= max(float(np.abs(short.shifts).max()), SMALLEST)
     name = "motion of a box struck off its fingers that short steps change, over the largest"
-    faulty = any(motion.health.fault for motion in motions)
+    faulty = struck.health.fault or short.health.fault
     return GateCheck(name, math.nan if faulty else changed, 0.0, CHANGED)
 
 

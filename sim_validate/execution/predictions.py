@@ -35,6 +35,7 @@ import importlib
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -98,31 +99,30 @@ class HeldDynamics:
         moved = np.array([max(each.moved_m / most_m, each.turn_rad / most_rad) for each in found])
         with np.errstate(divide="ignore"):
             sticking = 1.0 / moved
-        beyond = np.maximum(slips, loss_multiples(self.grip, loads, most_m, most_rad))
-        turning = [trial.turning for trial in trials]
-        losses = np.minimum(sticking, np.where(turning, slips, beyond))
+        beyond, once = slips.copy(), np.array([not trial.turning for trial in trials])
+        own, places = np.unique(loads[once], axis=0, return_inverse=True)
+        multiples = loss_multiples(self.grip, own, most_m, most_rad)[places]
+        beyond[once] = np.maximum(slips[once], multiples)
+        losses = np.minimum(sticking, beyond)
         return list(zip(slips.tolist(), losses.tolist(), strict=True))
 
     def expected(self, drives: Sequence[TrialDrive]) -> list[Expected]:
         """Solve (1) for each drive of a grip that is stable at rest."""
-        lengths = [len(drive) for drive in drives]
-        loads = np.zeros((len(drives), max(lengths), WRENCH))
-        bases = np.zeros((len(drives), max(lengths), *self.layout.contacts.shape))
-        for place, drive in enumerate(drives):
-            loads[place, : len(drive)], bases[place, : len(drive)] = self._load(drive)
-        grip, found = self.grip, list[Expected]()
-        for every, changes, count in zip(*self._responses(loads, bases), lengths, strict=True):
-            motion = every[:count]
-            slips = slip_steps(grip.local_squeeze, changes[:count], grip.friction).min(axis=1)
-            found.append(
-                Expected(
+        alike = dict[int, list[TrialDrive]]()
+        for drive in dict.fromkeys(drives):  # several trials may expect the same
+            alike.setdefault(len(drive), []).append(drive)
+        grip, found = self.grip, dict[TrialDrive, Expected]()
+        for own in alike.values():
+            loads, bases = map(np.array, zip(*map(self._load, own), strict=True))
+            for drive, motion, changes in zip(own, *self._responses(loads, bases), strict=True):
+                slips = slip_steps(grip.local_squeeze, changes, grip.friction).min(axis=1)
+                found[drive] = Expected(
                     first_slip=float(slips.min()),
                     slipping=motion[first_best(-slips)],
                     moved_m=float(np.linalg.norm(motion[:, :3], axis=1).max()),
                     turn_rad=float(np.linalg.norm(motion[:, 3:], axis=1).max()),
                 )
-            )
-        return found
+        return [found[drive] for drive in drives]
 
     def _load(self, drive: TrialDrive) -> tuple[Array, Array]:
         """Return w of (2), (n, 6), and the accelerations b_i, (n, k, 3), in the palm's axes."""
@@ -157,16 +157,22 @@ class HeldDynamics:
         changes = turns @ motion[..., 3:, :] - forces - inertia
         return motion[:, :, 0, :, 0], np.einsum("kij,...kil->...kj", grip.frames, changes)
 
-    def _solved(self, loads: Array) -> Array:
-        """Solve (1) from rest; return x, x' and x'' after each sample, (3, drives, n, 1, 6, 1)."""
+    @cached_property
+    def _advance(self) -> tuple[Array, Array, Array]:
+        """What takes (x, x') through a sample, and what a load adds to them, by (1); M^-1."""
         linalg: Any = importlib.import_module("scipy.linalg")
-        inverse = np.linalg.inv(self.mass)
+        inverse = np.asarray(np.linalg.inv(self.mass), dtype=np.float64)
         stiff, damp = inverse @ self.grip.grasp_stiffness, inverse @ self.damping
         system = np.zeros((3 * WRENCH, 3 * WRENCH))
         system[:WRENCH, WRENCH : 2 * WRENCH] = np.eye(WRENCH)
         system[WRENCH : 2 * WRENCH] = np.hstack([-stiff, -damp, inverse])
         advanced: Array = linalg.expm(SAMPLE_S * system)[: 2 * WRENCH]
-        step, gain = advanced[:, : 2 * WRENCH].T, advanced[:, 2 * WRENCH :].T
+        return advanced[:, : 2 * WRENCH].T, advanced[:, 2 * WRENCH :].T, inverse
+
+    def _solved(self, loads: Array) -> Array:
+        """Solve (1) from rest; return x, x' and x'' after each sample, (3, drives, n, 1, 6, 1)."""
+        step, gain, inverse = self._advance
+        stiff, damp = inverse @ self.grip.grasp_stiffness, inverse @ self.damping
         states = np.zeros((*loads.shape[:2], 2 * WRENCH))
         pushed = loads @ gain
         state = np.zeros((len(loads), 2 * WRENCH))

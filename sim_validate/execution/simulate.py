@@ -258,8 +258,9 @@ class _Losing:
     def following(self, going: Indices, samples: Indices, joints: Array, _speeds: Array) -> Indices:
         """Give the sample after one for each trial that goes on (see `Bench.simulated`)."""
         with np.errstate(over="ignore", invalid="ignore"):  # where the simulator diverges
-            away = joints[going, :3] - joints[going, 7:10]
-            gone = np.linalg.norm(away, axis=1) > self.most_m[going]
+            away = joints[going, :3]
+            away -= joints[going, 7:10]
+            gone = np.sqrt(np.einsum("ni,ni->n", away, away)) > self.most_m[going]
             if self.turns_count:
                 now = joints[going]
                 palm = hinged(now[:, 10 : PALM_END + 1]).transpose(0, 2, 1)
@@ -307,20 +308,26 @@ class TrialFigures:
 
 def outcome(motion: HeldMotion, drive: TrialDrive, friction: Array, begun: int = 0) -> TrialFigures:
     """Say what became of the object since a sample of a trial."""
-    moved, turned, radius_m = motion.shifts[begun:], motion.turns[begun:], motion.layout.radius_m
-    turns = np.arccos(np.clip(cosines(turned @ turned[0].T), -1.0, 1.0))
+    (moved, turned), radius_m = moves(motion, begun), motion.layout.radius_m
     slid = float(motion.slides(begun).max(initial=0.0))
     leaving = None if drive.table is None else motion.slid(begun) / radius_m
     multiple = _first_slip(motion.pushes, drive.shares, friction, begun, leaving)
     slipped = multiple <= 1.0 or slid > SLIPPED_BY * radius_m
     return TrialFigures(
         slip_m=slid,
-        displacement_m=float(np.linalg.norm(moved - moved[0], axis=1).max()),
-        turn_rad=float(turns.max()),
+        displacement_m=float(moved.max()),
+        turn_rad=float(turned.max()),
         dropped=not (motion.pushes[-1, :, 0] > 0.0).any(),
         slipped=slipped,
         first_slip=min(multiple, 1.0) if slipped else multiple,
     )
+
+
+def moves(motion: HeldMotion, begun: int) -> tuple[Array, Array]:
+    """Return how far an object has moved [m] and turned [rad] since a sample, (n - begun,) each."""
+    moved, turned = motion.shifts[begun:], motion.turns[begun:]
+    angles = np.arccos(np.clip(cosines(turned @ turned[0].T), -1.0, 1.0))
+    return np.linalg.norm(moved - moved[0], axis=1), angles
 
 
 def sticking_multiple(motion: HeldMotion, drive: TrialDrive, friction: Array, begun: int) -> float:

@@ -77,16 +77,17 @@ class ExecutionTrial(Declared):
     forces: one or less if a contact slipped, which is the share of the weight that had come, else
     how far away slip stayed. A slip under a load that follows the whole weight shows as one."""
     step_s: Quantity
-    """Length of the shortest steps that the simulator took: a loss with steps of the usual length
-    counts only if short steps find it as well, and so does more than half of the motion that is
-    allowed [s]."""
+    """Length of the shortest steps that the simulator took: an object that slips and is lost, or
+    moves by more than 0.3 of what is allowed, is simulated again with steps of half the length, and
+    with steps of 1/8 ms where that does not settle it [s]."""
     starts_closed: bool | None = None
     """Whether fingers first meet a misplaced object in force closure, before they squeeze; null for
     other trials, and where it is too close to decide."""
     converged: bool = False
     """Whether shorter steps would find the same motion: no contact slips, or the object is kept and
-    its motion was found with short steps. Elsewhere `slip_m`, `displacement_m` and `turn_rad` tell
-    their order only."""
+    two runs agree about its motion, or one with steps of 1/8 ms found it. Elsewhere `slip_m`,
+    `displacement_m` and `turn_rad` tell their order only, as those of every object that slips and
+    is lost: that it is lost does not depend on the steps, but how far it goes then does."""
 
     def _check_together(self) -> None:
         unknown = [math.isinf(each) for each in (self.slip_m, self.displacement_m, self.turn_rad)]

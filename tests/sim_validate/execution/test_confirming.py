@@ -9,8 +9,15 @@ import grasp_core as gc
 import scenes
 import sim_validate as sv
 from sim_validate.engine.stepping import Health
-from sim_validate.execution import confirming
-from sim_validate.execution.confirming import FINE_S, confirming_bench, run_again, run_trials
+from sim_validate.execution import confirming, holders
+from sim_validate.execution.confirming import (
+    FINE_S,
+    NEAR_LOSS,
+    confirmed_trials,
+    confirming_benches,
+    run_again,
+    run_trials,
+)
 from sim_validate.execution.execute import SpringFingers
 from sim_validate.execution.predictions import HeldDynamics
 from sim_validate.execution.simulate import HeldBench, outcome
@@ -32,7 +39,7 @@ def bar():
 
 def test_a_loss_of_a_step_that_is_too_long_does_not_count(bar, monkeypatch):
     found = {trial.name: trial for trial in sv.execute(*bar, 0.4, LIGHT).trials}
-    monkeypatch.setattr(confirming, "confirming_bench", lambda _: None)
+    monkeypatch.setattr(confirming, "confirming_benches", lambda _: iter(()))
     once = {trial.name: trial for trial in sv.execute(*bar, 0.4, LIGHT).trials}
     lost = {name for name, trial in once.items() if not trial.survived}
     assert "stop -y" in lost
@@ -48,15 +55,15 @@ def test_a_loss_of_a_step_that_is_too_long_does_not_count(bar, monkeypatch):
 def test_the_motion_of_a_kept_object_is_that_of_short_steps_where_it_nears_a_limit(
     bar, monkeypatch
 ):
-    """Limits of .7 mm, half of which only the stops that rattle exceed; the others say so."""
-    settings = replace(LIGHT, max_mm=0.7)
+    """A limit of 1.2 mm, of which one kept stop uses up more than .3; the others say so."""
+    settings = replace(LIGHT, max_mm=1.2)
     found = {trial.name: trial for trial in sv.execute(*bar, 0.4, settings).trials}
-    usual, half = found["stop +z"].step_s, 0.5 * settings.most_m
-    monkeypatch.setattr(confirming, "_is_near", lambda *_: False)
+    usual, near_m = found["stop +z"].step_s, NEAR_LOSS * settings.most_m
+    monkeypatch.setattr(confirming, "confirming_benches", lambda _: iter(()))
     once = {trial.name: trial for trial in sv.execute(*bar, 0.4, settings).trials}
     near = [
         name for name, trial in once.items()
-        if trial.survived and trial.fate == "slipped" and trial.displacement_m > half
+        if trial.survived and trial.fate == "slipped" and trial.displacement_m > near_m
     ]  # fmt: skip
     assert near == ["stop +y"]
     for name, trial in once.items():
@@ -107,10 +114,10 @@ def test_one_trial_that_diverges_loses_one_trial(monkeypatch):
     plain = sv.execute(body, grasp, 0.5, settings)
     judged = confirming._judged
 
-    def diverging(trial, motion, *more):
+    def diverging(trial, motion, *more, **settled):
         if trial.name == "knock -y":
             motion = replace(motion, health=Health(finite=False))
-        return judged(trial, motion, *more)
+        return judged(trial, motion, *more, **settled)
 
     monkeypatch.setattr(confirming, "_judged", diverging)
     found = sv.execute(body, grasp, 0.5, settings)
@@ -128,9 +135,39 @@ def test_a_loss_of_which_nothing_says_when_it_begins_is_run_again_as_a_whole():
     settings = sv.ExecutionSettings(0.1, trials=("weight",))
     bench, motions, _ = trials_on_a_bench(settings)
     (motion,) = motions.values()
-    short = confirming_bench(bench)
-    assert confirming_bench(short) is None  # short steps are not made shorter
+    half, short = confirming_benches(bench)
+    assert (half.chunk, short.step_s) == (2 * bench.chunk, pytest.approx(FINE_S))
+    assert not list(confirming_benches(short))  # short steps are not made shorter
     (again,) = run_again(short, motions, settings).values()
     assert len(again.moved) == len(motion.moved)
     assert np.array_equal(again.moved[0], motion.moved[0])
     assert (again.moved[1:] != motion.moved[1:]).any(axis=1).all()
+
+
+def test_half_the_steps_confirm_only_what_is_predicted_too():
+    settings = sv.ExecutionSettings(1.5, trials=("stop",))
+    bench, motions, _ = trials_on_a_bench(settings)
+    for loss, steps in ((0.8, 2 * bench.chunk), (1.0, bench.sample_s / FINE_S)):
+        predicted = dict.fromkeys(motions, (0.5, loss))
+        found = confirmed_trials(bench, motions, predicted, settings)
+        for trial in found.values():
+            assert not trial.survived, trial.name
+            assert trial.step_s == pytest.approx(bench.sample_s / steps), trial.name
+
+
+def test_an_object_that_closing_fingers_throw_about_is_run_again_as_a_whole(bar):
+    """A bar of 5 g, which steps of the usual length drop from fingers that meet it misplaced."""
+    settings = replace(LIGHT, trials=("misplaced",))
+    fingers = SpringFingers(bar[0], bar[1].contacts, 0.4)
+    scene, dynamics, trials, _ = holders.planned(fingers, settings, fingers.squeeze(settings))
+    bench = HeldBench(scene)
+    motions = run_trials(bench, trials)
+    predicted = dict(zip(trials, dynamics.losses(trials, settings), strict=True))
+    found = confirmed_trials(bench, motions, predicted, settings)
+    first = [outcome(motions[t], t.drive, scene.layout.friction, t.begun) for t in trials]
+    assert {each.dropped for each in first} == {True, False}
+    *_, short = confirming_benches(bench)
+    for trial, motion in run_trials(short, trials).items():
+        right = outcome(motion, trial.drive, scene.layout.friction, trial.begun)
+        assert found[trial].survived
+        assert found[trial].displacement_m == right.displacement_m, trial.name
