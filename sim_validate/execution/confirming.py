@@ -82,7 +82,7 @@ def confirmed_trials(
             break
         last = short.chunk >= _short_steps(bench)
         clear = {
-            t: m for t, m in left.items() if last or _can_settle(t, judged[t], bench, settings)
+            t: m for t, m in left.items() if last or _can_settle(t, judged[t], m, settings)
         }
         for trial, motion in run_again(short, clear, settings).items():
             first, runs = judged[trial], (motions[trial], motion)
