@@ -50,13 +50,23 @@ class Trace:
     """Displacement from the planned pose at the first sample of the trace [m]."""
     health: Health
 
+    def stayed(self, threshold_m: float) -> bool | None:
+        """Tell whether no displacement reached a threshold [m]; None if the trial is not valid."""
+        return None if self.health.fault else bool((self.displacements_m < threshold_m).all())
+
 
 def traces(
     motions: Sequence[Motion], layout: Layout, watched: Sequence[int],
     earlier: Motion | None = None,
 ) -> tuple[Trace, ...]:  # fmt: skip
     """Measure displacements, slips and gaps in motions, all together, which takes less time."""
-    parts, starts = _watched(motions, watched, earlier)
+    firsts = [
+        min(first, len(motion.joints)) for motion, first in zip(motions, watched, strict=True)
+    ]
+    starts = np.array(
+        [_start(motion, first, earlier) for motion, first in zip(motions, firsts, strict=True)]
+    )
+    parts = [motion.joints[first:] for motion, first in zip(motions, firsts, strict=True)]
     of = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
     joints, ends = np.concatenate(parts), np.cumsum([len(part) for part in parts])[:-1]
     size, normals, radii = layout.grasp_size_m, layout.frames[:, :, 0], layout.holder.tip_radii
@@ -77,31 +87,6 @@ def traces(
             motions, strayed(starts[:, :7], layout).tolist(), *each, strict=True
         )
     )
-
-
-def stayed(
-    motions: Sequence[Motion], layout: Layout, watched: Sequence[int], threshold_m: float,
-    earlier: Motion | None = None,
-) -> list[bool | None]:  # fmt: skip
-    """Tell whether no displacement reached a threshold [m]; None for a motion that is not valid."""
-    found = list[bool | None]()
-    for motion, part, start in zip(motions, *_watched(motions, watched, earlier), strict=True):
-        starts = np.broadcast_to(start[:7], (len(part), 7))
-        near = displaced(part[:, :7], starts, layout) < threshold_m
-        found.append(None if motion.health.fault else bool(near.all()))
-    return found
-
-
-def _watched(
-    motions: Sequence[Motion], watched: Sequence[int], earlier: Motion | None
-) -> tuple[list[Array], Array]:
-    """Return joint positions from when each object must stay, and those just before, (n, q)."""
-    firsts = [
-        min(first, len(motion.joints)) for motion, first in zip(motions, watched, strict=True)
-    ]
-    pairs = list(zip(motions, firsts, strict=True))
-    starts = np.array([_start(motion, first, earlier) for motion, first in pairs])
-    return [motion.joints[first:] for motion, first in pairs], starts
 
 
 def _start(motion: Motion, first: int, earlier: Motion | None) -> Array:

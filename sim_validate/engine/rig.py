@@ -14,7 +14,7 @@ import numpy as np
 from grasp_core.arrays import Array
 from scenes.mujoco.closure_scene import Layout, Scene
 from sim_validate.engine.early_ends import EarlyEnds
-from sim_validate.engine.held_or_let_go import Trace, stayed, traces
+from sim_validate.engine.held_or_let_go import Trace, traces
 from sim_validate.engine.schedules import Schedule, Thresholds, TrialLoad, samples, smooth
 from sim_validate.engine.setup import Setup
 from sim_validate.engine.stepping import Bench, Motion
@@ -115,20 +115,12 @@ class Rig:
 
     def traced(self, trials: Sequence[Schedule]) -> tuple[Trace, ...]:
         """Simulate trials until each is answered, and trace them from when friction is lowered."""
-        return self._traces(trials, self._answered(trials))
-
-    def stayed(self, trials: Sequence[Schedule], threshold_m: float) -> list[bool | None]:
-        """Tell whether each object stays within a threshold [m] from when friction is lowered."""
-        whole, watched, earlier = self._watched(trials, self._answered(trials))
-        return stayed(whole, self.bench.scene.layout, watched, threshold_m, earlier)
-
-    def _answered(self, trials: Sequence[Schedule]) -> tuple[Motion, ...]:
         bench, closed, ends = self.bench, self.closed, None
         answer = trials[0].answer if trials else None
         if answer is not None and not self.whole:
             at = None if closed is None or not len(closed.joints) else closed.joints[-1]
             ends = EarlyEnds(bench.scene.layout, trials, bench.sample_s, answer, at)
-        return self._simulated(trials, ends)
+        return self._traces(trials, self._simulated(trials, ends))
 
     def watch(self, trial: Schedule) -> Watched:
         """Simulate one whole trial, and keep all motion since the fingers closed."""
@@ -162,19 +154,12 @@ class Rig:
         return self.bench.simulated(told, start, ends.following, ends.earliest)
 
     def _traces(self, trials: Sequence[Schedule], motions: Sequence[Motion]) -> tuple[Trace, ...]:
-        whole, watched, earlier = self._watched(trials, motions)
-        return traces(whole, self.bench.scene.layout, watched, earlier)
-
-    def _watched(
-        self, trials: Sequence[Schedule], motions: Sequence[Motion]
-    ) -> tuple[Sequence[Motion], list[int], Motion | None]:
-        """Return motions with earlier faults, where watching begins, and what came before it."""
         closed = self.closed
         whole = motions if closed is None else [motion.after(closed) for motion in motions]
         watched = [
             trial.watched - motion.skipped for trial, motion in zip(trials, motions, strict=True)
         ]
-        return whole, watched, closed if self.settled else None
+        return traces(whole, self.bench.scene.layout, watched, closed if self.settled else None)
 
 
 def pushes(planned: Array, joints: Array, layout: Layout) -> Array:

@@ -67,7 +67,8 @@ def released_friction(
 
     def stays(frictions: list[float]) -> list[bool | None]:
         threshold = share * bench.scene.layout.grasp_size_m
-        return rig.stayed(rig.releases(high, frictions, threshold), threshold)
+        trials = rig.releases(high, frictions, threshold)
+        return [trace.stayed(threshold) for trace in rig.traced(trials)]
 
     if predicted < protocol.least_friction:
         (held,) = stays([protocol.least_friction])

@@ -84,8 +84,7 @@ def of_releases(body, grasp):
     whole = rig.traced(rig.releases(high, frictions))
     early = resting.traced(resting.releases(high, frictions, limit))
     for traces in zip(whole, early, strict=True):
-        stayed = ((trace.displacements_m < limit).all() for trace in traces)
-        yield *map(bool, stayed), *(len(each.times_s) for each in traces)
+        yield *(trace.stayed(limit) for trace in traces), *(len(each.times_s) for each in traces)
 
 
 @pytest.fixture
