@@ -81,9 +81,7 @@ def confirmed_trials(
         if not left:
             break
         last = short.chunk >= _short_steps(bench)
-        clear = {
-            t: m for t, m in left.items() if last or _can_settle(t, judged[t], m, settings)
-        }
+        clear = {t: m for t, m in left.items() if last or _can_settle(t, judged[t], m, settings)}
         for trial, motion in run_again(short, clear, settings).items():
             first, runs = judged[trial], (motions[trial], motion)
             found = _judged(trial, motion, predicted[trial], short, settings, settled=True)
