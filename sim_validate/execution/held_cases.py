@@ -381,8 +381,8 @@ def ring_frequency(points: Array, about: float, sample_s: float) -> float:
     return math.acos(0.5 * p / math.sqrt(q)) / (stride * sample_s)
 
 
-FALL_S = 0.2
-"""Time of the fall: steps of h make it h / FALL_S longer, 0.6 percent at 1.25 ms [s]."""
+FALL_S = 0.4
+"""Time of the fall: steps of h make it h / FALL_S longer, a third of a percent at 1.25 ms [s]."""
 FLIGHT_S = 0.2
 """Time in which the box flies after a knock [s]."""
 KNOCK_RAD_PER_S = 2.0
