@@ -14,7 +14,7 @@ PACKAGES = ("grasp_core", "scenes", "sim_validate")
 TOTALS = {
     "lines of packages": 61_173,
     "modules of packages": 304,
-    "lines of tests": 41_538,
+    "lines of tests": 41_548,
     "lines of docs": 3_986,
 }
 """Most that there may be. Who merges lowers a number to what the command prints. A number rises
@@ -23,7 +23,7 @@ RISES = (
     "lines of packages, 60,554 to 61,173, modules, 300 to 304: gates that are kept, samples"
     " simulated in one call, maps bounded side by side, runs again in two lengths of steps,"
     " processor time by kind of work, and published tests imported where they are asked for",
-    "lines of tests, 40,892 to 41,538: these beside what they replace, bit for bit or by proof,"
+    "lines of tests, 40,892 to 41,548: these beside what they replace, bit for bit or by proof,"
     " and executions beside short steps throughout",
     "lines of docs, 3,981 to 3,986: kept gates, time with -v, and which executions are run again",
     "modules, 263 to 300: modules of several subjects are divided, and each is named for what it"

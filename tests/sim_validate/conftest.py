@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from grasp_core.time_spent import in_words
 from sim_validate.commands.exit_codes import Exit
 from sim_validate.main import main
 from tests.sim_validate.datasets import engines
@@ -39,6 +40,16 @@ def asked(monkeypatch):
     found = []
     monkeypatch.setattr(
         "sim_validate.main._dispatch", lambda _, each: found.append(each) or Exit.GOOD
+    )
+    return found
+
+
+@pytest.fixture
+def spent(monkeypatch):
+    """The seconds of each kind of work that a command tells, before they are rounded."""
+    found = {}
+    monkeypatch.setattr(
+        "sim_validate.main.in_words", lambda each: found.update(each) or in_words(each)
     )
     return found
 

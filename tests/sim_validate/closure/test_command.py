@@ -133,7 +133,7 @@ def test_the_counts_of_controls_that_let_go_and_did_not_add_up(capsys):
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
-def test_details_end_with_where_the_time_went(planned, jobs, monkeypatch, capsys):
+def test_details_end_with_where_the_time_went(planned, jobs, spent, monkeypatch, capsys):
     monkeypatch.setattr(workers, "UNITS_PER_PROCESS", 1)
     monkeypatch.setattr(workers, "START_S", 0.0)
     words = ["validate", str(planned / "grasps.json"), "-v", "--jobs", str(jobs)]
@@ -144,6 +144,5 @@ def test_details_end_with_where_the_time_went(planned, jobs, monkeypatch, capsys
     )
     total, *parts = map(float, re.findall(r"\d+\.\d\d", line))
     assert total == pytest.approx(sum(parts), abs=0.005 * (1 + len(parts)))
-    _, _, scenes, stepping, _ = parts
-    assert min(scenes, stepping) > 0.0
+    assert min(spent["scenes"], spent["stepping"]) > 0.0
     assert "processor" not in (planned / "out" / "verdicts.json").read_text()

@@ -33,12 +33,12 @@ def test_a_dataset_is_made_and_nothing_is_wrong_with_it(dataset, answer):
 
 
 @pytest.mark.usefixtures("built_here")
-def test_a_build_tells_where_the_time_went(tmp_path, capsys):
+def test_a_build_tells_where_the_time_went(tmp_path, spent, capsys):
     words = ["dataset", "build", "tetrahedron", *LIGHT, "--out", str(tmp_path / "ds"), "-v"]
     assert main(words) == Exit.GOOD
-    spent = dict(re.findall(r"(\w+) (\d+\.\d\d)", capsys.readouterr().err.splitlines()[-1]))
+    assert capsys.readouterr().err.splitlines()[-1].startswith("time: ")
     assert list(spent) == ["planning", "analysis", "scenes", "stepping", "files"]
-    assert all(float(spent[work]) > 0.0 for work in ("planning", "stepping", "files"))
+    assert min(spent.values()) > 0.0
 
 
 def test_a_build_says_how_many_objects_each_split_has(dataset, capsys):
