@@ -52,13 +52,14 @@ def shown(value: Any) -> str:
     """Write a value for a message: short and on one line; a long value is shown by its kind."""
     if isinstance(value, int) and abs(value) > HUGE:
         return f"a whole number of {value.bit_length()} bits"
-    listed = cast("Iterable[Any]", value) if type(value) in {tuple, list} else None
-    plain = listed is not None and all(
-        isinstance(each, float | str | None) or (isinstance(each, int) and abs(each) <= HUGE)
+    listed = cast("list[Any]", value) if type(value) in {tuple, list} else None
+    plain = listed is not None and len(listed) <= SHOWN_VALUE and all(
+        isinstance(each, float | None) or (isinstance(each, int) and abs(each) <= HUGE)
+        or (isinstance(each, str) and len(each) <= SHOWN_VALUE)
         for each in listed
-    )
+    )  # fmt: skip
     if plain or isinstance(value, Real | str | type(None)):
-        said = repr(value)
+        said = repr(value[: SHOWN_VALUE + 1] if isinstance(value, str) else value)
         if len(said) <= SHOWN_VALUE:
             return said
         if isinstance(value, str | Real):

@@ -11,7 +11,7 @@ A contacts file is JSON: `{"contacts": [...]}` for one grasp, or `{"grasps": [{"
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
 from annotated_types import Interval, Len
@@ -294,7 +294,14 @@ def contact_sets_from_json(text: str, overrides: Overrides = Overrides()) -> tup
     found = json_of(text)
     if isinstance(found, dict) and "schema" in found and "contacts" not in found:
         return _planned(text, overrides)
-    file = from_record(ContactsFile, object_of(text, CONTACTS_FILE))
+    return given_contact_sets(object_of(text, CONTACTS_FILE), overrides)
+
+
+def given_contact_sets(
+    found: dict[str, Any], overrides: Overrides = Overrides()
+) -> tuple[ContactSet, ...]:
+    """Make contact sets of the object in a contacts file (see `contact_sets_from_json`)."""
+    file = from_record(ContactsFile, found)
     if file.contacts is not None:
         return (_contact_set(file, file.contacts, "0", "contacts", overrides),)
     listed = file.grasps or ()

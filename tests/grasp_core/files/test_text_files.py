@@ -5,9 +5,9 @@ import pytest
 import grasp_core as gc
 import scenes
 from grasp_core.errors import InputError
-from grasp_core.files.text_files import read_text, write_text
+from grasp_core.files.text_files import read_bytes, read_text, write_text
 from sim_validate.files.array_files import read_arrays
-from sim_validate.hands.dexgraspbench import load_dex_record
+from sim_validate.files.numpy_pickles import MOST_PICKLE_BYTES
 
 
 def test_a_file_is_replaced_as_a_whole(tmp_path):
@@ -34,7 +34,7 @@ def test_a_pointer_of_git_lfs_is_called_what_it_is_by_every_reader(ending, tmp_p
     path = tmp_path / f"file.{ending}"
     path.write_text(POINTER)
     read = {
-        "json": gc.load_grasps, "npy": load_dex_record,
+        "json": gc.load_grasps, "npy": lambda path: read_bytes(path, MOST_PICKLE_BYTES),
         "xml": partial(scenes.hand_from_file, fingertips=("a", "b", "c")),
         "npz": lambda path: read_arrays(path, ()),
     }.get(ending, gc.load_polyhedron)  # fmt: skip
