@@ -17,7 +17,7 @@ import numpy as np
 from grasp_core.arrays import Array, Indices
 from grasp_core.errors import InputError
 from scenes.hand_files.model_text import ModelText, note
-from scenes.mujoco.silent_mujoco import mujoco, unlogged
+from scenes.silent_mujoco import mujoco, unlogged
 
 NO_MASS_KG, NO_INERTIA_KG_M2 = 1e-12, 1e-14
 """Mass and inertia up to which there are none; MuJoCo compiles no joint that moves less than
@@ -69,18 +69,23 @@ class HandModel(NamedTuple):
     notes: tuple[str, ...]  # sentences about what was compiled otherwise
 
 
-def compiled_hand(text: ModelText) -> HandModel:
-    """Compile a hand's text."""
+def compiled_hand(text: ModelText, *, lending: bool = True) -> HandModel:
+    """Compile a hand's text.
+
+    Bodies without shapes that collide do so with all they have; unless `lending`, only where no
+    body of the file has shapes that collide.
+    """
     try:
         with unlogged(), warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # about textures and the like
+            warnings.simplefilter("ignore")  # about materials and the like
+            mujoco.mj_clearCache(mujoco.mj_getCache())  # of other hands' files with the same names
             spec = mujoco.MjSpec.from_string(text.xml, assets=dict(text.files))
             odd = _replaced(spec)
             compiler = spec.compiler
             compiler.fusestatic, compiler.balanceinertia = False, True
             compiler.boundmass = max(compiler.boundmass, NO_MASS_KG)
             compiler.boundinertia = max(compiler.boundinertia, NO_INERTIA_KG_M2)
-            model = spec.compile()
+            model, notes = _without_unread(spec, text)
     except (ValueError, RuntimeError, mujoco.FatalError) as error:
         said = " ".join(str(error).split())[:300]
         raise InputError(f"MuJoCo cannot compile the file: {said}") from error
@@ -91,7 +96,7 @@ def compiled_hand(text: ModelText) -> HandModel:
     for quaternion, matrix in zip(model.geom_quat, turns, strict=True):
         mujoco.mju_quat2Mat(matrix, quaternion)
     bits = np.column_stack([model.geom_contype, model.geom_conaffinity]).astype(np.int64)
-    lent = _lent(model, bits)
+    lent = _lent(model, bits) if lending or not bits.any() else []
     bits[np.isin(model.geom_bodyid, lent)] = EVERY_BIT
     kinds = tuple(mujoco.mjtJoint(int(kind)).name[6:].lower() for kind in model.jnt_type)
     hinges = model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE
@@ -116,6 +121,7 @@ def compiled_hand(text: ModelText) -> HandModel:
         loops=_loops(model),
         tendons=_tendons(model),
         notes=(
+            *notes,
             *note("inertias that no body can have count by their masses alone", odd),
             *note(
                 "bodies without shapes that collide do so with all they have",
@@ -131,6 +137,59 @@ def _lent(model: mujoco.MjModel, bits: Indices) -> list[int]:
     shown = model.geom_bodyid[model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE]
     marks = np.flatnonzero(model.body_mocapid >= 0).tolist()
     return sorted(set(shown.tolist()) - moving - {0, *marks})
+
+
+def _without_unread(spec: mujoco.MjSpec, text: ModelText) -> tuple[mujoco.MjModel, tuple[str, ...]]:
+    """Compile a model without meshes that only show and cannot be read; return it with notes.
+
+    Shapes that neither collide nor give a body its mass only show. Where no shape of the file
+    collides, all of them will.
+    """
+    solid = [geom for geom in spec.geoms if geom.type != mujoco.mjtGeom.mjGEOM_PLANE]
+    colliding = [geom for geom in solid if geom.contype or geom.conaffinity]
+    used = {geom.meshname for geom in colliding or solid}
+    always = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
+    for body in spec.bodies[1:]:  # the first is the world
+        if not body.explicitinertial or int(spec.compiler.inertiafromgeom) == int(always):
+            used |= {geom.meshname for geom in body.geoms if geom.density and geom.mass != 0.0}
+    for mesh in spec.meshes:
+        if mesh.name in used and mesh.file in text.unread:
+            raise InputError(text.unread[mesh.file])
+    shown = {mesh.name: mesh.file for mesh in spec.meshes if mesh.name not in used}
+    notes = _delete_meshes(spec, {name for name, file in shown.items() if file in text.unread})
+    try:
+        return spec.compile(), notes
+    except ValueError:
+        left = {name: file for name, file in shown.items() if file not in text.unread}
+        broken = {name for name, file in left.items() if not _is_mesh(file, text.files[file])}
+        notes = (*notes, *_delete_meshes(spec, broken))
+        return spec.compile(), notes
+
+
+def _delete_meshes(spec: mujoco.MjSpec, names: set[str]) -> tuple[str, ...]:
+    """Delete meshes and their geoms; return notes."""
+    geoms = [geom for geom in spec.geoms if geom.meshname in names]
+    bodies = {geom.parent.name: geom.parent for geom in geoms if geom.parent.name != "world"}
+    for element in [*geoms, *(mesh for mesh in spec.meshes if mesh.name in names)]:
+        spec.delete(element)
+    bare = [name or "?" for name, body in bodies.items() if not body.geoms]
+    return (
+        *note("meshes that only show and cannot be read are left out", sorted(names)),
+        *note("bodies that have only such meshes touch nothing", bare),
+    )
+
+
+def _is_mesh(file: str, content: bytes) -> bool:
+    """Return whether MuJoCo compiles a body that has a mesh alone."""
+    spec = mujoco.MjSpec()
+    spec.assets = {file: content}
+    spec.add_mesh(name="mesh", file=file)
+    spec.worldbody.add_body().add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname="mesh")
+    try:
+        spec.compile()
+    except ValueError:
+        return False
+    return True
 
 
 def _replaced(spec: mujoco.MjSpec) -> list[str]:

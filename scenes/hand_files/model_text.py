@@ -3,19 +3,22 @@
 MuJoCo's compiler reads any file that a model names. Here the model's files are read first, up to a
 size, and handed over in memory; the text that is compiled names nothing on disk. They are read from
 the model's own folder and the package that it is in, and where no package is known, models and
-shapes also from folders beside the model's, as in `urdf` and `meshes`. Elements that attach other
-models, run code or copy parts are refused.
+shapes also from folders beside the model's, as in `urdf` and `meshes`. Whether a model can do
+without a mesh that cannot be read is found where it is compiled. Elements that attach other models,
+run code or copy parts are refused.
 """
 
 import importlib
 import re
 from collections import deque
+from collections.abc import Container, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from grasp_core.errors import InputError, about
 from grasp_core.files.text_files import bounded_bytes
+from scenes.hand_files.left_out import without_missing, without_unused
 
 LARGEST_TEXT, LARGEST_FILES = 4 * 2**20, 64 * 2**20
 """Largest size of the text, and of all files that it names together [bytes]."""
@@ -25,11 +28,11 @@ REFUSED = ("include", "model", "plugin", "extension", "replicate", "composite", 
            "attach")  # fmt: skip
 """Elements that attach other models, run code or make copies in any number."""
 MOST_PIXELS = 4096
-"""Largest value of the attributes that say how large pictures and fields of heights are."""
-COUNTED, COUNTS = ("texture", "hfield"), ("width", "height", "nrow", "ncol")
-FOLDERS = {"meshdir", "texturedir", "assetdir", "strippath"}
+"""Largest value of the attributes that say how large fields of heights are."""
+COUNTS = ("nrow", "ncol")
+MESH_FOLDERS, OTHER_FOLDERS = ("meshdir", "assetdir"), ("texturedir", "strippath")
 """Attributes that say where files are."""
-NAMED_BY_FILES = ("mesh", "texture", "hfield")
+NAMED_BY_FILES = ("mesh", "hfield")
 """Elements that are called like their files where they have no name."""
 PACKAGE = re.compile(r"(?:package|model)://([^/]*)/+")
 """What begins the names of files in URDF, with the name of a package."""
@@ -40,8 +43,8 @@ PARENTS_TRIED = 4
 """Number of folders above the model's that may be the package's."""
 PACKAGE_FILE = "package.xml"
 """File in the folder of a ROS package that says how it is called."""
-IGNORED_ELEMENTS = ("gazebo", "transmission", "ros2_control")
-"""Elements of URDF that are about other things than the hand's shape, and may hold anything."""
+MOST_PARTS = 8
+"""Number of last parts of a file's name with which it is looked for."""
 MOBILE = {"revolute", "continuous", "prismatic"}
 """Kinds of URDF joints that move by one number."""
 PLAIN_NAME = re.compile(r"[\w.-]+", re.ASCII)
@@ -54,6 +57,7 @@ class ModelText:
 
     xml: str
     files: dict[str, bytes]  # the files that it names, by the names in it
+    unread: dict[str, str]  # why some are empty, which are meshes that could not be read
     notes: tuple[str, ...] = ()  # sentences about what was read otherwise
 
 
@@ -66,8 +70,7 @@ def model_text(path: Path) -> ModelText:
     if root.tag == "mujoco":
         with about("<include>"):
             folders = _with_includes(root, path, LARGEST_TEXT - len(raw), etree)
-    for other in [each for each in root if each.tag in IGNORED_ELEMENTS and root.tag == "robot"]:
-        root.remove(other)
+    obsolete, lost = without_unused(root), without_missing(root)
     kinds = {joint.get("name"): joint.get("type") for joint in root.findall("joint")}
     for joint in root.findall("joint"):  # MuJoCo would take those that follow a fixed one as free
         mimic = joint.find("mimic")
@@ -80,7 +83,11 @@ def model_text(path: Path) -> ModelText:
         if inertial.find("inertia") is None:  # as of a point; masses are all that counts
             axes = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
             inertial.append(etree.Element("inertia", dict.fromkeys(axes, "0")))
-    notes = _with_shapes(root)
+    notes = (
+        *_with_shapes(root),
+        *note("attributes that MuJoCo no longer has are left out", obsolete),
+        *note("motors, tendons and contacts of parts that the file lacks are left out", lost),
+    )
     elements = list(root.iter())
     if root.tag not in {"mujoco", "robot"} or len(elements) > MOST_ELEMENTS:
         raise InputError(
@@ -89,7 +96,8 @@ def model_text(path: Path) -> ModelText:
         )
     for element in elements:
         _check_element(element)
-    return ModelText(*_with_files(folders, root, elements, etree), notes)
+    files, unread = _with_files(folders, elements, root.tag == "mujoco")
+    return ModelText(etree.tostring(root, encoding="unicode"), files, unread, notes)
 
 
 def _parsed(raw: bytes, etree: Any) -> Any:
@@ -117,7 +125,7 @@ def _with_includes(root: Any, path: Path, left: int, etree: Any) -> list[Path]:
                 parents.append((element, folder))
                 continue
             given = element.get("file", "")
-            found = _found(given, [path.parent, folder])
+            found = _found(given, [path.parent, folder], taken=known)
             if found in known or len(known) > MOST_FILES:
                 raise InputError(
                     f"names the file {given[:80]!r} once more, but a model includes a file once, "
@@ -172,7 +180,7 @@ def _check_element(element: Any) -> None:
         )
     if element.tag == "size":  # how much memory MuJoCo takes
         element.attrib.clear()
-    for key in COUNTS if element.tag in COUNTED else ():
+    for key in COUNTS if element.tag == "hfield" else ():
         if len(element.get(key, "0")) > len(str(MOST_PIXELS)):
             raise InputError(
                 f"{key} of <{element.tag}> must be at most {MOST_PIXELS}, got "
@@ -181,65 +189,86 @@ def _check_element(element: Any) -> None:
 
 
 def _with_files(
-    folders: list[Path], root: Any, elements: list[Any], etree: Any
-) -> tuple[str, dict[str, bytes]]:
-    """Read the files that elements name, and give them names of their own."""
-    places = _places(folders, elements)
+    folders: list[Path], elements: list[Any], is_mjcf: bool
+) -> tuple[dict[str, bytes], dict[str, str]]:
+    """Read the files that elements name, and give them names of their own.
+
+    Gives also why meshes cannot be read, which are without content then.
+    """
+    stated = _stated_folders(elements)
     files, names, left = dict[str, bytes](), dict[str, str](), LARGEST_FILES
+    unread = dict[str, str]()
     for element in elements:
         for key in [key for key in element.attrib if key.startswith("file")]:
             given = element.attrib[key]
             if given not in names:
-                found = _found(given, places)
-                content = _bytes(found, left)
-                left -= len(content)
-                # in the compiler's messages it is called as it is, if that name is plain and free
-                free = found.stem.lower() not in {Path(name).stem.lower() for name in files}
-                plain = PLAIN_NAME.fullmatch(found.name) is not None
-                own = f"file{len(files)}{found.suffix.lower()}"
-                names[given] = found.name if free and plain else own
+                try:
+                    found = _found(given, folders, stated)
+                    content, names[given] = _bytes(found, left), _own_name(found, files)
+                except InputError as error:
+                    if element.tag != "mesh":
+                        raise
+                    content, names[given] = b"", _own_name(Path("?.obj"), files)
+                    unread[names[given]] = str(error)
                 files[names[given]] = content
+                left -= len(content)
             if len(names) > MOST_FILES:
                 raise InputError(f"names more than {MOST_FILES} files")
-            if element.tag in NAMED_BY_FILES and root.tag == "mujoco":  # unnamed ones are called so
+            if element.tag in NAMED_BY_FILES and is_mjcf:  # unnamed ones are called so
                 element.attrib.setdefault("name", Path(given).stem)
             element.attrib[key] = names[given]
-    return etree.tostring(root, encoding="unicode"), files
+    return files, unread
 
 
-def _places(folders: list[Path], elements: list[Any]) -> list[Path]:
-    """Return where files are: the model's folder, those that the model states, and other folders.
+def _own_name(found: Path, files: dict[str, bytes]) -> str:
+    """Name a file in the compiler's messages as it is, if that name is plain and free."""
+    free = found.stem.lower() not in {Path(name).stem.lower() for name in files}
+    plain = PLAIN_NAME.fullmatch(found.name) is not None
+    return found.name if free and plain else f"file+{len(files)}{found.suffix.lower()}"
 
-    Stated folders are relative to the model's, or to those of included files; they are forgotten.
-    """
+
+def _stated_folders(elements: list[Any]) -> list[str]:
+    """Return the folders that a model states, relative to its own; the model forgets them."""
     stated = list[str]()
     for element in elements:
         if element.tag == "compiler":
-            for key in FOLDERS & set(element.attrib):
-                value = element.attrib.pop(key)
-                if key != "strippath":
+            for key in [*MESH_FOLDERS, *OTHER_FOLDERS]:
+                value = element.attrib.pop(key, None)
+                if value is not None and key in MESH_FOLDERS:
                     stated.append(value)
-    inside = [folder / value for folder in folders for value in stated]
-    return list(dict.fromkeys([folders[0], *inside, *folders]))
+    return list(dict.fromkeys(stated))
 
 
-def _found(given: str, places: list[Path]) -> Path:
+def _found(
+    given: str, folders: list[Path], stated: Sequence[str] = (), taken: Container[Path] = ()
+) -> Path:
     """Find a named file near the model, or in the package that the name begins with.
 
-    The model's folder is the first of the places.
+    The first folder is the model's; stated ones are relative to all. A file that is elsewhere is
+    looked for by the last parts of its name, below the model's folder and those above, because
+    simulators start in other folders; files that are taken are not found so.
     """
-    home, package = places[0].resolve(), PACKAGE.match(given)
+    home, package = folders[0].resolve(), PACKAGE.match(given)
     name = given[package.end() :] if package else given
-    tried = [(None, place / name) for place in places]
+    below, above = [*stated, ""], (home, *home.parents[:PARENTS_TRIED])
+    tried = [(None, folder / value / name) for folder in folders for value in stated or below]
     if package:
         tried += [(root, root / name) for root in _roots(home, package[1])]
-    tried += [(None, place / Path(name).name) for place in places]
+    exact = len(tried)
+    names = [Path(value, name).parts for value in below]
+    tails = {Path(*parts[-n:]): n for n in range(MOST_PARTS, 0, -1) for parts in names}
+    for tail in sorted(tails, key=tails.__getitem__, reverse=True):  # the most parts first
+        tried += [(None, folder / tail) for folder in above]
+    tried += [
+        (None, folder / value / own)
+        for own in (name, Path(name).name) for folder in folders for value in below
+    ]  # fmt: skip
     around = _package_around(home)
-    for root, each in tried:
+    for number, (root, each) in enumerate(tried):
         try:
             whole = each.resolve()
             inside = whole.is_relative_to(root) if root else _is_near(whole, home, around)
-            if inside and whole.is_file():
+            if inside and whole.is_file() and (number < exact or whole not in taken):
                 return whole
         except (OSError, ValueError, RuntimeError):
             continue

@@ -75,11 +75,13 @@ BAD = {
                   ("s0", "s1", "s2"), "<replicate>"),
     "plugin": (gripper(extra="<extension><plugin plugin='a'/></extension>"), ("s0", "s1", "s2"),
                "<extension>|<plugin>"),
-    "mesh outside": (gripper(extra='<asset><mesh file="../secret.stl"/></asset>'),
-                     ("s0", "s1", "s2"), "not in the folder"),
-    "huge texture": (
-        gripper(extra='<asset><texture builtin="flat" width="90000" height="9"/></asset>'),
-        ("s0", "s1", "s2"), "width of <texture>",
+    "mesh outside": (
+        gripper(("mesh", 'mesh="secret"'), '<asset><mesh file="../secret.stl"/></asset>'),
+        ("s0", "s1", "s2"), "not in the folder",
+    ),
+    "huge field": (
+        gripper(extra='<asset><hfield nrow="90000" ncol="9" size="1 1 1 1"/></asset>'),
+        ("s0", "s1", "s2"), "nrow of <hfield>",
     ),
     "slide": (gripper().replace('axis="0 0 1"', 'type="slide" axis="0 0 1"'),
               ("s0", "s1", "s2", "s3"), "must be a hinge"),

@@ -45,6 +45,44 @@ def test_a_stated_folder_is_relative_to_the_model(key, tmp_path):
     assert palm_of(written(tmp_path / "xml", text)) == pytest.approx([0.01, 0.02, 0.03], abs=1e-6)
 
 
+UPWARDS = {
+    "from above": ("mjcf", "./mjcf/meshes/", "mjcf/meshes"),
+    "beside": ("mjcf/hand", "../../../bundle/hand/assets", "mjcf/assets"),
+    "beside, with more parts": ("mjcf/hand", "../../../bundle/other/assets", "mjcf/other/assets"),
+    "far above in a package": ("package/a/b/c", "meshes", "package/meshes"),
+    "of another machine": ("mjcf", "/home/someone/hand/meshes", "mjcf/meshes"),
+}
+
+
+@pytest.mark.parametrize("case", UPWARDS)
+def test_a_stated_folder_is_looked_for_above_the_model_and_by_its_last_parts(case, tmp_path):
+    home, stated, place = UPWARDS[case]
+    written(tmp_path / "package", "<package/>", "package.xml")
+    box_at(tmp_path / place / "palm.obj")
+    text = including(more=f'<compiler meshdir="{stated}"/>{ASSET}')
+    path = written(tmp_path / home, text)
+    assert palm_of(path) == pytest.approx([0.01, 0.02, 0.03], abs=1e-6)
+
+
+def test_a_file_is_taken_from_where_it_is_stated_first_and_then_by_most_parts(tmp_path):
+    places = ("xml/far/meshes", "xml/meshes", "xml")
+    text = including(more=f'<compiler meshdir="far/meshes"/>{ASSET}')
+    path = written(tmp_path / "xml", text)
+    for n, place in enumerate(reversed(places)):
+        size = 0.01 * (n + 1)
+        written(tmp_path / place, box_obj(size, size, size), "palm.obj")
+        assert palm_of(path) == pytest.approx([size] * 3, abs=1e-6)
+
+
+def test_names_that_are_made_up_are_those_of_no_file(tmp_path):
+    box_at(tmp_path / "file1.obj")
+    written(tmp_path, box_obj(0.04, 0.04, 0.04), "a b.obj")
+    files = '<asset><mesh name="palm" file="file1.obj"/><mesh file="a b.obj"/></asset>'
+    assert palm_of(written(tmp_path, including(more=files))) == pytest.approx(
+        [0.01, 0.02, 0.03], abs=1e-6
+    )
+
+
 def test_a_manifest_opens_the_whole_package(tmp_path):
     written(tmp_path / "hand", box_obj(0.005, 0.005, 0.005), "middle.obj")
     text = robot(middle=meshed("../../middle.obj"))
@@ -116,6 +154,7 @@ REFUSED = {
     "itself": (["gripper.xml"], "once more"),
     "twice": (["a.xml", "a.xml"], "once more"),
     "in a circle": (["b.xml"], "once more"),
+    "missing, called alike": (["../../far/gripper.xml"], "not in the folder"),
     "missing": (["none.xml"], "<include>: names the file 'none.xml', which is not in the folder"),
     "no name": ([""], "<include>: names the file ''"),
     "outside": (["../../secret.xml"], "not in the folder"),

@@ -114,9 +114,9 @@ def test_a_package_is_looked_for_above_the_file_by_its_folder_or_its_own_name(tm
     assert loaded(root, text, TIPS).links[1] == hand.links[1]
     other = root.rename(tmp_path / "checkout")
     with pytest.raises(InputError, match="package my_hand around it"):
-        loaded(other / "urdf", text, TIPS)
+        loaded(other / "models" / "urdf", text, TIPS)
     (other / "package.xml").write_text("<package><name>my_hand</name></package>")
-    assert loaded(other / "urdf", text, TIPS).links[1] == hand.links[1]
+    assert loaded(other / "models" / "urdf", text, TIPS).links[1] == hand.links[1]
 
 
 OUTSIDE = {
