@@ -155,7 +155,9 @@ class HandChains(ByValue):
     """Bits of what palm and links touch besides each other; last links touch none of it, as their
     fingertips do."""
     weld: Weld | None = None
-    """What the hand hangs on; its joints then stop at the ends of their ranges."""
+    """What the hand hangs on."""
+    stops: bool = False
+    """Whether joints and commands stop at the ends of the joints' ranges."""
 
     def add_to(
         self, parts: Parts, parent: Element, touching: Sequence[dict[str, Any]],
@@ -184,12 +186,12 @@ class HandChains(ByValue):
             add_element(body, "geom", _tip(parts, finger) | tips.get(number, {}))
         for one, other in _overlapping(self.hand):
             add_element(parts["contact"], "exclude", {"body1": one, "body2": other})
-        for number, joint in enumerate(self.hand.joints):  # commands on a weld end where joints do
+        for number, joint in enumerate(self.hand.joints):
             most = None if self.limits is None else float(self.limits[number])
             add_servo(
                 parts["actuator"], joint.name, self.servo, self.damping_n_m_s_per_rad,
                 None if most is None else (-most, most),
-                None if self.weld is None else (joint.lowest, joint.highest),
+                (joint.lowest, joint.highest) if self.stops else None,
             )  # fmt: skip
 
     def _link(self, parent: Element, link: Link, angle: float) -> Element:
@@ -201,7 +203,7 @@ class HandChains(ByValue):
         lifted = {"gravcomp": 0.0 if self.weighs else 1.0}
         body = add_element(parent, "body", {"name": link.name} | lifted | place)
         hinge = {"name": joint.name, "type": "hinge", "axis": joint.axis,
-                 "limited": "false" if self.weld is None else "true",
+                 "limited": "true" if self.stops else "false",
                  "range": (joint.lowest - angle, joint.highest - angle),
                  "armature": self.armature_kg_m2}  # fmt: skip
         add_element(body, "joint", FREE_JOINT | hinge)

@@ -25,6 +25,7 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
 from scenes.mujoco.chains import HandChains, Weld, hand_inertials
 from scenes.mujoco.closure_scene import GENTLE_SQUEEZE, arrange
+from scenes.mujoco.filed_hand import OBJECT_BIT, FiledHand
 from scenes.mujoco.fingertips import Slides
 from scenes.mujoco.hand_scenes import build_hand_scene
 from scenes.mujoco.mjcf_text import FINGERTIP_BIT, IDENTITY_POSE, SHAPE_BIT, SceneText, quaternion
@@ -38,6 +39,7 @@ TESTED_COMMENT = (
     "Servos stand open at the start, and are told to close and to squeeze."
 )
 CENTER_OF_MASS = np.zeros((1, 3))
+POSE_NUMBERS = 7
 TIP_MASS_KG = 0.05
 """Mass of a fingertip with the part of its finger that moves with it."""
 OPEN_M, OPEN_SIZES = 0.01, 0.25
@@ -109,8 +111,6 @@ class Postures:
     pushes_n: Array
     limits_n_m: Array | None = None
     """Largest torques of the joints' motors, (j,) [N m]; None for none."""
-    axes: Array = field(default_factory=lambda: np.eye(3))
-    """Columns are the axes along which the test pulls, in the object's frame, (3, 3)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -123,6 +123,9 @@ class TestedObject:
     friction: float
     mass_kg: float
     physics: PhysicsSettings
+    pieces: tuple[Array, ...] | None = None
+    """Corners of the convex pieces that the object is simulated as, (n, 3) each [m]; None for its
+    own surface."""
 
     def by_fingertips(
         self, grasp: Grasp | Sequence[Contact], fingers: FingerSettings
@@ -148,14 +151,14 @@ class TestedObject:
         """Make the scene of a hand that closes on the object."""
         palms, free = postures.palms.copy(), servos.weld is not None
         palms[:, :3, 3] -= self.body.center_of_mass
-        used = [place for place, finger in enumerate(hand.fingers) if not _covered(finger)]
+        used = [place for place, finger in enumerate(hand.fingers) if not is_covered(finger)]
         step_s, tips = self.physics.timestep, [hand.fingers[place].tip for place in used]
         chains = HandChains(
             hand=hand, angles=np.zeros(len(hand.joints)),
             palm_pose=servos.root if free else palms[1], used_fingers=tuple(used),
             limits=postures.limits_n_m, servo=servos.stiffness_n_m_per_rad,
             armature_kg_m2=servos.armature(step_s), damping_n_m_s_per_rad=servos.damping(step_s),
-            rubbing=self.physics.rubbing(self.friction), weld=servos.weld,
+            rubbing=self.physics.rubbing(self.friction), weld=servos.weld, stops=free,
             inertials={**hand_inertials(hand), **servos.inertials} if free else {},
         )  # fmt: skip
         opened, shut, squeezing = np.hstack([_roots(palms, servos), to_digits(postures.joints)])
@@ -163,7 +166,15 @@ class TestedObject:
             chains, [FINGERTIP_BIT if tip.corners is None else SHAPE_BIT for tip in tips],
             pushes_n=postures.pushes_n, opened=opened, shut=shut, squeezing=squeezing,
             fingers=tuple(tuple(link.name for link in finger.links) for finger in hand.fingers),
-            axes=postures.axes,
+        )  # fmt: skip
+
+    def by_filed_hand(self, hand: FiledHand) -> TestedScene:
+        """Make the scene of a hand as its file has it; it stands anywhere, and is told nothing."""
+        count = len(hand.joints)
+        none = np.zeros(count + (0 if hand.weld is None else POSE_NUMBERS))
+        return self._held(
+            hand, [], pushes_n=np.zeros(0), opened=none, shut=none, squeezing=none,
+            fingers=hand.fingers,
         )  # fmt: skip
 
     def postures(self, hand: Hand, reach: HandReach, stiffness_n_m_per_rad: float) -> Postures:
@@ -177,9 +188,14 @@ class TestedObject:
         pushes = scene.layout.squeeze[:, 0]
         return Postures(np.tile(palm, (3, 1, 1)), joints, pushes, scene.hand.limits)
 
-    def _held(self, holder: Slides | HandChains, bits: Sequence[int], **told: Any) -> TestedScene:
+    def _held(
+        self, holder: Slides | HandChains | FiledHand, bits: Sequence[int], **told: Any
+    ) -> TestedScene:
         body, physics = self.body, self.physics
-        found = touched_solids(body, CENTER_OF_MASS, 2.0 * body.radius)
+        if self.pieces is None:
+            found = touched_solids(body, CENTER_OF_MASS, 2.0 * body.radius)
+        else:
+            found = tuple(piece - body.center_of_mass for piece in self.pieces)
         held = SceneObject(
             name=body.name,
             vertices=to_digits(body.vertices - body.center_of_mass),
@@ -190,13 +206,14 @@ class TestedObject:
             inertia_kg_m2=to_digits(self.mass_kg / body.volume * body.inertia),
         )
         rubbing, opened = physics.rubbing(self.friction), told["opened"]
-        pose = 7 if isinstance(holder, HandChains) and holder.weld is not None else 0
+        pose = POSE_NUMBERS if isinstance(holder, HandChains) and holder.weld is not None else 0
         key = {"qpos": np.concatenate([IDENTITY_POSE, opened]), "ctrl": opened[pose:]}
         moved = {"mpos": opened[:3], "mquat": opened[3:7]} if pose else {}
         content = SceneContent(
             comment=TESTED_COMMENT, held=held, physics=physics, rubbing=rubbing, holder=holder,
-            tips=[(each, rubbing) for each in bits], bits=FINGERTIP_BIT | SHAPE_BIT,
-            keys={"open": key | moved},
+            tips=[(each, rubbing) for each in bits],
+            bits=OBJECT_BIT if isinstance(holder, FiledHand) else FINGERTIP_BIT | SHAPE_BIT,
+            keys={} if isinstance(holder, FiledHand) else {"open": key | moved},
         )  # fmt: skip
         return TestedScene(
             scene_text(content), physics, self.friction, self.mass_kg, held.inertia_kg_m2, **told
@@ -213,7 +230,7 @@ def _roots(palms: Array, servos: HandServos) -> Array:
     return np.hstack([poses[:, :3, 3], turns])
 
 
-def _covered(finger: HandFinger) -> bool:
+def is_covered(finger: HandFinger) -> bool:
     """Return whether a shape of a finger's last link holds the whole ball that its tip is."""
     place, radius = finger.tip.center[None], finger.tip.radius - COVERED_M
     shapes = finger.links[-1].shapes if finger.tip.corners is None else ()

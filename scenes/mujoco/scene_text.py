@@ -47,6 +47,7 @@ from scenes.mujoco_options import PhysicsSettings
 
 if TYPE_CHECKING:
     from scenes.mujoco.chains import HandChains
+    from scenes.mujoco.filed_hand import FiledHand
 
 SCENE_SECTIONS = ("asset", "worldbody", "equality", "contact", "actuator", "keyframe")
 FLAGS_OF_EXACT = {"midphase": "disable", "island": "disable"}
@@ -97,7 +98,7 @@ class SceneContent:
     physics: PhysicsSettings
     rubbing: tuple[float, float, float]
     """Coefficients of the object's surface as in MJCF; of two that touch, the larger counts."""
-    holder: "Slides | HandChains"
+    holder: "Slides | HandChains | FiledHand"
     tips: Sequence[tuple[int, tuple[float, float, float]]]
     """Bits of what the holder's fingertips touch, and their coefficients."""
     bits: int = FINGERTIP_BIT

@@ -9,7 +9,8 @@ import pytest
 
 import grasp_core as gc
 import scenes
-from scenes.mujoco import silent_mujoco, version_gaps
+from scenes import silent_mujoco
+from scenes.mujoco import version_gaps
 
 FLAG = ' speculative="disable"'
 
