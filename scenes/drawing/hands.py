@@ -44,6 +44,7 @@ from scenes.drawing.painting import (
     Role,
     edge_on,
     least_gaps,
+    panes_of,
     views_at,
 )
 
@@ -253,15 +254,23 @@ def hand_shapes(held: PosedHand) -> tuple[Drawable, ...]:
     """Return the shapes of a hand in the object's frame, fingertips in the colours of contacts."""
     parts, shapes = parts_of(held), list[Drawable]()
     least = LEAST_RADII * max(finger.tip.radius for finger in held.hand.fingers)
-    for n, contact in enumerate(parts.contacts):
+    for contact, polygons in solids_of(parts, least):
         role: Role = "hand" if contact is None else "fingertip"
+        shapes.append(Drawable(role, contact, polygons=polygons))
+    return tuple(shapes)
+
+
+def solids_of(parts: HandParts, least: float) -> Iterator[tuple[int | None, tuple[Array, ...]]]:
+    """Yield the sides of each convex solid of a hand, with the contact of its part.
+
+    Pieces of long parts are at least as long as `least` [m].
+    """
+    for n, contact in enumerate(parts.contacts):
         if (corners := parts.blocks[n]) is not None:
-            shapes.append(Drawable(role, contact, polygons=_hull(corners)))
+            yield contact, _hull(corners)
             continue
         for sides in _pieces(parts.half_sizes[n], float(parts.radii[n]), least):
-            placed = tuple(parts.middles[n] + side @ parts.axes[n].T for side in sides)
-            shapes.append(Drawable(role, contact, polygons=placed))
-    return tuple(shapes)
+            yield contact, tuple(parts.middles[n] + side @ parts.axes[n].T for side in sides)
 
 
 def _pieces(half: Array, radius: float, least: float) -> Iterator[tuple[Array, ...]]:
@@ -310,17 +319,21 @@ def extent_with(body: Polyhedron, parts: HandParts) -> Alone:
 
 def view_of_hand(body: Polyhedron, held: PosedHand) -> Camera:
     """Choose a view in which contacts, object and hand are seen."""
-    parts = parts_of(held)
+    return view_of_parts(body, parts_of(held), held.positions, numbers_behind(held))
+
+
+def view_of_parts(body: Polyhedron, parts: HandParts, contacts: Array, others: Array) -> Camera:
+    """Choose a view of an object in a hand that shows contacts (c, 3) [m], apart from others."""
     extent = extent_with(body, parts)
     angles, axes = views_at(HAND_ELEVATIONS)
     cameras = extent.center_of_mass + VIEW_RADII * extent.radius * axes[:, 2]
-    centroids = np.array([face.centroid for face in body.faces])
+    centroids, normals, _ = panes_of(body)
     arms = cameras[:, None] - centroids
-    facing = np.einsum("vfi,fi->vf", arms, body.normals) < 0.0  # normals point into the object
+    facing = np.einsum("vfi,fi->vf", arms, normals) < 0.0  # normals point into the object
     behind = _hidden(centroids, cameras, parts) & facing
     covered = behind.sum(axis=1) / np.maximum(facing.sum(axis=1), 1)
-    hidden = _hidden(held.positions, cameras, parts).mean(axis=1)
-    apart = least_gaps(axes, np.vstack([held.positions, numbers_behind(held)]), extent)
+    hidden = _hidden(contacts, cameras, parts).mean(axis=1)
+    apart = least_gaps(axes, np.vstack([contacts, others]), extent)
     merits = apart / body.radius - HIDDEN * hidden - FAULT_BEHIND * covered
     way = body.center_of_mass - parts.middles.mean(axis=0)
     along = np.abs(axes[:, 2] @ way) / max(float(np.linalg.norm(way)), LEAST_RAY_M)

@@ -13,7 +13,7 @@ a second. Figures that a grasp has put off are left out, because the first of th
 
 import importlib
 import json
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cache
 from html import escape
@@ -26,6 +26,7 @@ import numpy as np
 from grasp_core.allowed_values import path_of
 from grasp_core.arrays import Array
 from grasp_core.by_value import ByValue, counted
+from grasp_core.figures import figures
 from grasp_core.files.text_files import write_parts
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach
@@ -48,6 +49,8 @@ from scenes.drawing.sheets import ASSETS, svg_of
 from scenes.mujoco.closure_scene import Layout, Scene
 
 NO_VALUE = "-"
+GOOD_TONE, BAD_TONE, QUIET_TONE = "good", "bad", "quiet"
+"""Classes of the style sheet for what is said."""
 MILLION = 1e6
 """Size from which numbers are written with a power of ten."""
 OF_OBJECT = ("object", "edge")
@@ -70,6 +73,7 @@ MOST_DRAWN_CORNERS = 20_000
 """Largest number of points that are drawn: they take a third of a second, and a megabyte."""
 LEGEND_ROWS = 5
 TableRow = Sequence[str]
+TemplateData: TypeAlias = Mapping[str, Any]
 
 
 def filled(template: str, folder: Path = ASSETS, **values: object) -> str:
@@ -226,6 +230,34 @@ def grasp_facts(
     lower, upper = map(number, grasp.ferrari_canny)
     between = lower if lower == upper else f"{lower} to {upper}"
     yield "Ferrari-Canny quality", f"{between} N{at_plan}", QUALITY
+
+
+def facts_of(record: object, but: Sequence[str] = ()) -> Iterable[Fact]:
+    """Yield the figures that a record has, but for those that the page says in other places."""
+    for each in figures(type(record)):
+        if each.name not in but and each.of(record) is not None:
+            yield each.shown.heading, each.cell(record), each.explained
+
+
+def records_table(records: Sequence[object], kind: type) -> TemplateData:
+    """Build a table of the figures of records, for the template `records.html`.
+
+    A figure that is true is good, and one that is false is bad. Those that no record has are left
+    out.
+    """
+    listed = [each for each in figures(kind) if any(each.of(one) is not None for one in records)]
+    tones = {True: GOOD_TONE, False: BAD_TONE}
+    return {
+        "columns": [(figure.shown.heading, figure.explained) for figure in listed],
+        "rows": [
+            [
+                (figure.cell(one), tones[value] if isinstance(value, bool) else "")
+                for figure in listed
+                for value in [figure.of(one)]
+            ]
+            for one in records
+        ],
+    }
 
 
 def as_text(data: object) -> str:

@@ -25,6 +25,8 @@ from grasp_core.arrays import Shape as ArrayShape
 from grasp_core.declared import Declared, declared
 from grasp_core.geometry.polygons import FEWEST_CORNERS, convex_hull
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.objects.shells import sampled
+from grasp_core.objects.surface import Mesh
 from grasp_core.solvers.ties import first_best
 from grasp_core.values import Grasp
 from scenes.drawing.panels import thinned
@@ -35,6 +37,7 @@ from scenes.drawing.sheets import (
     HAND,
     INK_HEX,
     SURFACE_HEX,
+    TOUCHING,
     Area,
     Dots,
     Line,
@@ -126,8 +129,21 @@ def best_view(body: Polyhedron, grasp: Grasp) -> Camera:
 
 def edge_on(body: Polyhedron, axes: Array) -> Array:
     """Return the share of an object's surface that is seen nearly as lines in each view, (n,)."""
-    areas = np.array([face.area for face in body.faces])
-    return (np.abs(axes[:, 2] @ body.normals.T) < EDGE_ON_COSINE) @ areas / areas.sum()
+    _, normals, areas = panes_of(body)
+    return (np.abs(axes[:, 2] @ normals.T) < EDGE_ON_COSINE) @ areas / areas.sum()
+
+
+def panes_of(body: Polyhedron) -> tuple[Array, Array, Array]:
+    """Return middles [m] and inward normals, (n, 3) each, and areas, (n,) [m^2], of faces.
+
+    Triangles that stand for equal shares of the surface take their place where there are none.
+    """
+    if body.faces:
+        middles, areas = zip(*((face.centroid, face.area) for face in body.faces), strict=True)
+        return np.array(middles), body.normals, np.array(areas)
+    surface = Mesh(body.vertices, body.triangles)
+    some = sampled(surface.areas)
+    return surface.corners[some].mean(axis=1), -surface.normals[some], np.ones(len(some))
 
 
 @cache
@@ -153,7 +169,7 @@ def _enlarged(nearness: Array, distance: float) -> Array:
 
 Role: TypeAlias = Literal[
     "object", "edge", "finger", "friction cone", "force cone", "region", "line of force", "focus",
-    "plane", "ruled surface", "contact", "hand", "fingertip",
+    "plane", "ruled surface", "contact", "hand", "fingertip", "link in contact",
 ]  # fmt: skip
 Near: TypeAlias = tuple[float, Mark]
 SMOOTH_DEG = 20.0
@@ -177,7 +193,7 @@ clear glass."""
 SHORT_LINED: tuple[Role, ...] = ("friction cone",)
 EMPTY_MARGIN = 0.04
 CUT_RADII = 2.0
-NEVER_CUT: tuple[Role, ...] = ("hand", "fingertip")
+NEVER_CUT: tuple[Role, ...] = ("hand", "fingertip", "link in contact")
 MANY_CORNERS = 60
 
 
@@ -274,6 +290,7 @@ LOOKS: dict[Role, RoleLook] = {
     "contact": RoleLook(dot=1.2),
     "hand": RoleLook(HAND, fill=1.0, shaded=True, solid=True),
     "fingertip": RoleLook(HAND, fill=1.0, shaded=True, solid=True),
+    "link in contact": RoleLook(TOUCHING, fill=1.0, shaded=True, solid=True),
 }
 
 

@@ -40,6 +40,8 @@ FINGER_COLOURS = ("#E69F00", "#56B4E9", "#009E73", "#CC79A7")
 INK_HEX, GLASS, FOCUS_HEX, SURFACE_HEX = "#30363d", "#8296ab", "#D55E00", "#0072B2"
 HAND = "#b9b0a4"
 """Colour of a hand's links: warm and muted, so that it is neither a finger's nor the object's."""
+TOUCHING = FINGER_COLOURS[1]
+"""Colour of links that touch, where contacts have no colours of their own."""
 GOOD_HEX, BAD_HEX, NEUTRAL = "#0072B2", "#D55E00", "#686e77"
 PAPER = "#ffffff"
 NIGHT = {

@@ -9,7 +9,8 @@ import pytest
 import scenes
 from grasp_core.errors import InputError
 from grasp_core.hands.hand_arrays import places
-from scenes.drawing.hands import QUARTER_SIDES, hand_shapes
+from grasp_core.objects.convex_pieces import pieced_object
+from scenes.drawing.hands import QUARTER_SIDES, hand_shapes, view_of_hand
 from scenes.drawing.pictures import write_picture
 from tests.scenes.drawing.standing import ROUNDING, held, standing
 
@@ -50,6 +51,13 @@ def surface_gaps(place, turn, shape, points):
     local = np.abs((local - shape.position) @ shape.rotation) - shape.half_sizes
     outside = np.linalg.norm(np.maximum(local, 0.0), axis=1)
     return outside + np.minimum(local.max(axis=1), 0.0) - shape.radius
+
+
+def test_a_body_without_faces_is_seen_from_where_the_same_box_is():
+    box, one = standing()[0], held()
+    body = pieced_object([box.vertices]).body
+    assert not body.faces
+    np.testing.assert_array_equal(view_of_hand(body, one).axes, view_of_hand(box, one).axes)
 
 
 def test_users_give_a_hand_and_what_was_found(tmp_path):
