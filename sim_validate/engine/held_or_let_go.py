@@ -116,6 +116,17 @@ def moved(poses: Array, starts: Array, layout: Layout) -> tuple[Array, Array]:
     return shifts, rotation_angles(poses[:, 3:], starts[:, 3:])
 
 
+def displacements(poses: Array, middle: Array, size_m: float) -> Array:
+    """Measure displacements of poses (n, 7) from the first, (n,) [m].
+
+    A rotation counts as the path of a point that is a size [m] away from a middle (3,).
+    """
+    starts = np.broadcast_to(poses[:1], poses.shape)
+    ahead = poses[:, :3] + rotated(poses[:, 3:], middle)
+    shifts = lengths_of(ahead - starts[:, :3] - rotated(starts[:, 3:], middle))
+    return shifts + size_m * rotation_angles(poses[:, 3:], starts[:, 3:])
+
+
 def _tips(joints: Array, layout: Layout) -> Array:
     """Compute fingertip centres in the object's frame, (n, k, 3)."""
     centers = layout.holder.tips(joints[:, 7:]) - joints[:, None, :3]

@@ -23,8 +23,8 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.errors import InputError
 from grasp_core.time_spent import TIME_SPENT
 from scenes.mujoco.mjcf_text import SceneText
-from scenes.mujoco.silent_mujoco import batch, mujoco, unlogged
 from scenes.mujoco.version_gaps import WRONG_FACTOR
+from scenes.silent_mujoco import batch, mujoco, unlogged
 
 STATE = (
     "time", "qpos", "qvel", "ctrl", "qfrc_applied", "xfrc_applied", "mocap_pos", "mocap_quat",
@@ -49,6 +49,10 @@ OBJECT_END, PALM_END = 6, 12
 FEWEST_SIMULATIONS = 2
 """Fewest trials that room is made for: one to close the fingers, and most controls have two."""
 CLOSURE_STEPS = 5
+BAD_STATE = [
+    getattr(mujoco.mjtWarning, f"mjWARN_BADQ{part}").value for part in ("POS", "VEL", "ACC")
+]
+"""Warnings of numbers that are not finite, or so large that they soon will not be."""
 CLOCK_SLACK_S = 1e-9
 """Largest clock error that counts as rounding [s]: simulated time is a sum of equal steps, and a
 reset would change it by milliseconds."""
@@ -253,8 +257,8 @@ class Bench(Generic[AnyScene]):
         with TIME_SPENT.on("stepping"):
             ahead = self._rolled(sims, inputs, read, unseen)
             ends = self._stepped(sims, told, seen, lengths, following, ahead)
-        counts, skipped, errors, late = ends
-        off = sims.state[:count, CLOCK] - (begun + self.chunk * counts * self.step_s)
+        counts, stepped, skipped, errors, late = ends
+        off = sims.state[:count, CLOCK] - (begun + self.chunk * stepped * self.step_s)
         times = np.arange(1.0, most + 1.0) * self.chunk * self.step_s
         motions = list[Motion]()
         for trial, own in enumerate(counts.tolist()):
@@ -304,18 +308,19 @@ class Bench(Generic[AnyScene]):
         self, sims: batch.Batch, told: Sequence[tuple[Array, Array]],
         read: Sequence[tuple[Array, Array]], lengths: Sequence[int], following: Following | None,
         ahead: int,
-    ) -> tuple[Indices, Indices, dict[int, str], Indices]:  # fmt: skip
+    ) -> tuple[Indices, Indices, Indices, dict[int, str], Indices]:  # fmt: skip
         """Step trials through their samples, after those that were simulated `ahead`.
 
         Before a sample each view of the simulator gets the values that are told, after it each view
-        that is read is copied. Gives the numbers of samples that were simulated and left out,
-        errors, and the trials that were stopped before their ends.
+        that is read is copied. A trial that has diverged stays as it is: to step numbers that are
+        not finite takes a hundred times as long. Gives the numbers of samples that were read,
+        simulated and left out, errors, and the trials that were stopped before their ends.
         """
         every, count = np.array(lengths), len(lengths)
         joints, speeds = self._field(sims, "qpos"), self._field(sims, "qvel")
-        samples, counts = np.full((2, count), ahead, dtype=np.intp)
+        samples, counts, stepped = np.full((3, count), ahead, dtype=np.intp)
         skipped, errors = np.zeros(count, dtype=np.intp), dict[int, str]()
-        going = np.flatnonzero(samples < every)
+        diverged, going = np.zeros(count, dtype=bool), np.flatnonzero(samples < every)
         with unlogged():
             while going.size and time.monotonic() <= self.deadline:
                 now = samples[going]
@@ -324,11 +329,14 @@ class Bench(Generic[AnyScene]):
                     rows, at, to = slice(count), now[0], to[0]
                 for view, values in told:
                     view[rows] = values[rows, at]
-                running = np.setdiff1d(going, list(errors)) if errors else going
+                running = going[~diverged[going]] if diverged.any() else going
+                stepped[running] += 1
                 try:
                     sims.step(running, nstep=self.chunk)
                 except batch.SimulationError as failure:
                     errors.update({int(trial): sims.error(int(trial)) for trial in failure.ids})
+                    diverged[failure.ids] = True
+                diverged |= sims.warning[:count, BAD_STATE, 1].any(axis=1)
                 for view, found in read:
                     found[rows, to] = view[rows]
                 counts[going] += 1
@@ -339,7 +347,7 @@ class Bench(Generic[AnyScene]):
                 if (then > now + 1).any():
                     skipped[going] += left * (then - now - 1)
                 going = going if left.all() else going[left]
-        return counts, skipped, errors, going
+        return counts, stepped, skipped, errors, going
 
     def shapes(self, names: Sequence[str]) -> list[int]:
         """Return the places of shapes that have names."""
@@ -371,15 +379,13 @@ class Bench(Generic[AnyScene]):
         return normals, depths
 
     def touching(self, states: Sequence[Array]) -> list[set[str]]:
-        """Return the names of the bodies that touch the object in states; none if one diverged."""
+        """Return the names of the bodies that touch the object in states."""
         data, found = mujoco.MjData(self.model), list[set[str]]()
         for state in states:
-            met = []
-            if np.isfinite(state).all():
-                mujoco.mj_setState(self.model, data, state, mujoco.mjtState.mjSTATE_INTEGRATION)
-                mujoco.mj_forward(self.model, data)
-                bodies = self.model.geom_bodyid[data.contact.geom]
-                met = bodies[(bodies == self.body).any(axis=1)].ravel().tolist()
+            mujoco.mj_setState(self.model, data, state, mujoco.mjtState.mjSTATE_INTEGRATION)
+            mujoco.mj_forward(self.model, data)
+            bodies = self.model.geom_bodyid[data.contact.geom]
+            met = bodies[(bodies == self.body).any(axis=1)].ravel().tolist()
             found.append({self.model.body(place).name for place in set(met) - {self.body}})
         return found
 

@@ -9,7 +9,7 @@ from mujoco import batch
 
 import grasp_core as gc
 from grasp_core.arrays import to_digits
-from scenes.mujoco.silent_mujoco import unlogged
+from scenes.silent_mujoco import unlogged
 from sim_validate.engine import stepping
 from sim_validate.engine.held_or_let_go import Outcome, judge
 from sim_validate.engine.schedules import TrialLoad, part
@@ -108,6 +108,22 @@ def test_a_good_hold_beside_a_blow_up_is_judged_on_its_own(held):
     assert outcomes == [Outcome.HELD, Outcome.DIVERGED, Outcome.HELD]
     (alone,) = rig.traced(rig.holds([still]))
     np.testing.assert_array_equal(alone.displacements_m, together[2].displacements_m)
+
+
+def test_a_trial_that_diverges_stays_as_it_is(held):
+    """Steps with numbers that are not finite take a hundred times as long."""
+    _, _, rig = held
+    (wild,) = rig.holds([TrialLoad(np.full(6, 1e14), rig.idle.forces)])
+    bench = Bench(rig.bench.scene, kept=("time",))
+    (motion,) = bench.simulated([wild.told(bench.scene.layout)], rig.closed.state)
+    (times,) = motion.kept
+    assert len(motion.joints) == len(wild.forces)
+    assert motion.health.fault
+    last = int(np.argmax(times))
+    assert last < 0.1 * len(times)
+    assert (times[last:] == times[last]).all()
+    still = np.broadcast_to(motion.joints[last], motion.joints[last:].shape)
+    np.testing.assert_array_equal(motion.joints[last:], still)
 
 
 def test_text_that_is_no_scene_is_refused():
