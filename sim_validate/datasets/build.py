@@ -8,7 +8,7 @@ from typing import NamedTuple
 from grasp_core.errors import InputError
 from grasp_core.files.file_kinds import MANIFEST
 from grasp_core.files.text_files import read_text, write_text
-from sim_validate.datasets.computing import Engine, compute_all
+from sim_validate.datasets.computing import Engine, compute_all, compute_unit
 from sim_validate.datasets.config import DatasetConfig, config_to_toml, settings_text
 from sim_validate.datasets.layout import CONFIG, OWN_FILES, STAGING_FOLDER
 from sim_validate.datasets.manifest import Manifest, path_inside, read_manifest
@@ -49,7 +49,7 @@ def build(
             write_text(folder / CONFIG, config_to_toml(config))
             unfinished = staging.unfinished(units)  # an interrupted build is resumed with these
             _check_simulator(config, unfinished)
-            compute_all(unfinished, staging, engine, report, timeout_s)
+            compute_all(unfinished, staging, engine, report, timeout_s, compute_unit)
             rows = write_rows(folder, config, units, staging)
             write_card_and_manifest(folder, config, rows)
         staging.remove()

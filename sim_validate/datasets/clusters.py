@@ -1,4 +1,4 @@
-"""Runs units of work on a Ray or Dask cluster.
+"""Starts what runs units of work: processes of this machine, or a Ray or Dask cluster.
 
 Neither cluster repeats a unit by itself, because one place decides for all engines when to give up
 on a unit. Without `address`, Ray and Dask start workers on this machine and stop them afterwards.
@@ -9,13 +9,14 @@ import os
 import socket
 from collections.abc import Callable, Generator, Mapping
 from concurrent.futures import Future
-from contextlib import ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 from grasp_core.errors import InputError
+from grasp_core.processes import Processes, local_processes
 
 OBJECT_STORE_BYTES = 200 * 2**20
 """Size of the object store of a Ray started here; units and their rows go through files."""
@@ -43,6 +44,21 @@ class Cluster:
     """Names of the errors which say that a worker process died while it computed."""
     submit: Callable[[Callable[[Any], Any], Any], "Future[Any]"]
     """Calls a function with a unit on a worker process; the future fails if that process dies."""
+
+
+def workers_of(
+    engine: str, jobs: int, address: str | None
+) -> AbstractContextManager[Processes | Cluster]:
+    """Start processes of this machine, or start or join a cluster."""
+    if engine != "local":
+        start = ray_workers if engine == "ray" else dask_workers
+        return start(jobs, address)
+    if address is not None:
+        raise InputError(
+            "--address names a Ray or Dask cluster: give --engine ray or --engine dask too, or "
+            "leave it out"
+        )
+    return local_processes(jobs)
 
 
 @contextmanager

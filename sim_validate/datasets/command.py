@@ -1,6 +1,6 @@
 """Runs the commands that build, import and verify datasets."""
 
-from contextlib import AbstractContextManager
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,14 +9,12 @@ from grasp_core.errors import InputError
 from grasp_core.files.file_kinds import QUARANTINE
 from grasp_core.files.records import record_of
 from grasp_core.mesh_files.limits import MESH_FORMATS
-from grasp_core.processes import local_processes
 from grasp_core.settings import extended
 from sim_validate.commands.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.commands.exit_codes import Exit
 from sim_validate.datasets import flags as dataset_flags
 from sim_validate.datasets.build import build
-from sim_validate.datasets.clusters import dask_workers, ray_workers
-from sim_validate.datasets.computing import Engine
+from sim_validate.datasets.clusters import workers_of
 from sim_validate.datasets.config import (
     CREDITS,
     DatasetConfig,
@@ -65,7 +63,8 @@ def _build(
     config: DatasetConfig, out: Path, work: dataset_flags.Working, reporter: Reporter
 ) -> int:
     _warn(config, reporter)
-    with reporter.progress("building") as steps, _engine(work) as engine:
+    workers = workers_of(work.engine, work.jobs, work.address)
+    with reporter.progress("building") as steps, workers as engine:
         built = build(config, out, engine, steps.update, work.timeout_s)
     manifest, rows = built.manifest, built.manifest.rows
     before, filled = manifest.units - built.made, manifest.units - manifest.quarantined
@@ -85,28 +84,19 @@ def _build(
     return Exit.PARTIAL if manifest.quarantined else Exit.GOOD
 
 
-def _engine(work: dataset_flags.Working) -> AbstractContextManager[Engine]:
-    if work.engine != "local":
-        start = ray_workers if work.engine == "ray" else dask_workers
-        return start(work.jobs, work.address)
-    if work.address is not None:
-        raise InputError(
-            "--address names a Ray or Dask cluster: give --engine ray or --engine dask too, or "
-            "leave it out"
-        )
-    return local_processes(work.jobs)
-
-
 def verify_dataset(command: dataset_flags.VerifyFlags, reporter: Reporter) -> int:
     """Check a dataset and list its faults."""
     faults = verify(command.dataset, command.share, command.seed)
+    return tell_faults(command.dataset, faults, reporter)
+
+
+def tell_faults(folder: Path, faults: Sequence[str], reporter: Reporter) -> int:
+    """List the faults of a folder that was checked."""
     for fault in faults[:TABLE_ROWS]:
         reporter.warn(fault)
     say_cut(len(faults), reporter)
-    reporter.say(
-        f"{command.dataset}: {'nothing is wrong' if not faults else f'faults: {len(faults)}'}"
-    )
-    reporter.document({"dataset": str(command.dataset), "faults": faults})
+    reporter.say(f"{folder}: {'nothing is wrong' if not faults else f'faults: {len(faults)}'}")
+    reporter.document({"dataset": str(folder), "faults": [*faults]})
     return Exit.NEGATIVE if faults else Exit.GOOD
 
 

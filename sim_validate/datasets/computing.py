@@ -20,14 +20,13 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from threading import TIMEOUT_MAX
-from typing import TypeAlias
+from typing import Any, Generic, Protocol, TypeAlias, TypeVar
 
 from grasp_core.errors import GraspError
 from grasp_core.processes import Processes
 from grasp_core.time_spent import TIME_SPENT, Seconds
 from sim_validate.datasets.clusters import Cluster
 from sim_validate.datasets.making_rows import compute_rows
-from sim_validate.datasets.resuming import Staging
 from sim_validate.datasets.work_units import WorkerError, WorkUnit, body_of, provenance
 from sim_validate.processes.interrupts import check_interrupted
 
@@ -37,13 +36,43 @@ UNITS_AHEAD = 3
 INTERRUPT_LOOK_S = 1.0
 
 
-ComputeUnit: TypeAlias = Callable[[WorkUnit, Staging], None]
+Unit = TypeVar("Unit")
+Kept = TypeVar("Kept", contravariant=True)
 
 
-def compute_unit(unit: WorkUnit, staging: Staging) -> None:
+class UnitStaging(Protocol[Kept]):
+    """What keeps the results of units until all of them are there."""
+
+    @property
+    def folder(self) -> Path:
+        """The folder of all units."""
+        ...
+
+    def of(self, unit: Kept) -> Path:
+        """Return the file or folder that is there once a unit is finished or quarantined."""
+        ...
+
+    def write(self, unit: Kept, made: Any) -> None:
+        """Keep what was computed of a unit."""
+        ...
+
+    def quarantine(self, unit: Kept, reason: str) -> None:
+        """Record that a unit cannot be computed, with the reason."""
+        ...
+
+
+ComputeUnit: TypeAlias = Callable[[Unit, UnitStaging[Unit]], None]
+
+
+def compute_unit(unit: WorkUnit, staging: UnitStaging[WorkUnit]) -> None:
     """Compute the rows of a unit and keep them, or the reason why there are none."""
+    keep_result(unit, staging, lambda unit: compute_rows(unit, body_of(unit)))
+
+
+def keep_result(unit: Unit, staging: UnitStaging[Unit], work: Callable[[Unit], object]) -> None:
+    """Keep what a function makes of a unit, or the reason why it makes nothing."""
     try:
-        staging.write(unit, compute_rows(unit, body_of(unit)))
+        staging.write(unit, work(unit))
     except WorkerError:
         raise
     except GraspError as error:
@@ -57,19 +86,19 @@ def compute_unit(unit: WorkUnit, staging: Staging) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class UnitTask:
+class UnitTask(Generic[Unit]):
     """A unit of work, with all that a worker process needs to compute it."""
 
-    unit: WorkUnit
-    staging: Staging
+    unit: Unit
+    staging: UnitStaging[Unit]
     provenance: Mapping[str, str]
     """Versions of packages, and the hash of the code, that the worker process must have, too."""
-    timeout_s: float | None = None
+    timeout_s: float | None
     """Time that the unit may take [s]; None for no limit."""
-    compute: ComputeUnit = compute_unit
+    compute: ComputeUnit[Unit]
 
 
-def compute_in_worker(task: UnitTask) -> Seconds:
+def compute_in_worker(task: UnitTask[Any]) -> Seconds:
     """Compute a unit in a worker process, and keep its rows; return the time that it took."""
     own = provenance()
     for name, wanted in task.provenance.items():
@@ -103,18 +132,18 @@ def _ending_after(timeout_s: float | None) -> Generator[None]:
 
 
 def compute_all(
-    units: Sequence[WorkUnit],
-    staging: Staging,
+    units: Sequence[Unit],
+    staging: UnitStaging[Unit],
     engine: Engine,
     report: Callable[[int, int], None],
-    timeout_s: float | None = None,
-    compute: ComputeUnit = compute_unit,
+    timeout_s: float | None,
+    compute: ComputeUnit[Unit],
 ) -> None:
     """Have all units computed; each one is kept or quarantined in the end.
 
     Takes `report` (finished, total).
     """
-    own, finished, again = dict(provenance()), 0, list[UnitTask]()
+    own, finished, again = dict(provenance()), 0, list[UnitTask[Unit]]()
     tasks = [UnitTask(unit, staging, own, timeout_s, compute) for unit in units]
     report(finished, len(units))
     for task, good in _ended(tasks, engine, UNITS_AHEAD * engine.workers):
@@ -133,10 +162,10 @@ def compute_all(
 
 
 def _ended(
-    tasks: Sequence[UnitTask], engine: Engine, ahead: int
-) -> Iterator[tuple[UnitTask, bool]]:
+    tasks: Sequence[UnitTask[Unit]], engine: Engine, ahead: int
+) -> Iterator[tuple[UnitTask[Unit], bool]]:
     """Yield each task when it has ended, with whether it is done or its worker process has died."""
-    waiting, under_way = deque(tasks), dict[Future[Seconds], UnitTask]()
+    waiting, under_way = deque(tasks), dict[Future[Seconds], UnitTask[Unit]]()
     while waiting or under_way:
         while waiting and len(under_way) < ahead:
             task = waiting.popleft()
@@ -147,11 +176,11 @@ def _ended(
         check_interrupted()
 
 
-def _succeeded(future: "Future[Seconds]", task: UnitTask, engine: Engine) -> bool:
+def _succeeded(future: "Future[Seconds]", task: UnitTask[Any], engine: Engine) -> bool:
     error = future.exception()
     if error is None:
         TIME_SPENT.add(future.result())
-        if task.staging.of(task.unit).is_dir():
+        if task.staging.of(task.unit).exists():
             return True
         raise WorkerError(
             f"{task.staging.folder}: a worker process has computed rows that do not appear here; "

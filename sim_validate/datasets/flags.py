@@ -16,15 +16,15 @@ from sim_validate.processes.workers import available_cores
 
 @declared
 class Working(Settings):
-    """Where a dataset is computed, and how much time; no row depends on these."""
+    """Where units of work are computed, and in which time; no result depends on these."""
 
     engine: Literal["local", "ray", "dask"] = "local"
     """Where to compute: in processes of this machine, or on a Ray or Dask cluster."""
     address: str | None = None
     """Address of the Ray or Dask cluster; if not given, one is started on this machine."""
     timeout_s: Positive = 3600.0
-    """Time after which an attempt at one object and friction is stopped; each gets two attempts
-    [s]."""
+    """Time after which an attempt at one unit of work is stopped, an object at a friction or some
+    records of an object; each gets two attempts [s]."""
     jobs: Count = field(default_factory=available_cores)
     """Number of processes; results do not depend on it."""
 
@@ -64,8 +64,9 @@ class VerifyFlags(Spoken):
     """Flags of the command `dataset verify`."""
 
     dataset: Positional[Path]
-    """Folder of the dataset."""
+    """Folder of the dataset, or of the judgements that `judge` has written."""
     share: Share = 0.01
-    """Share of all objects and frictions that is computed again, at least one; 0 for none."""
+    """Share of all objects and frictions that is computed again, at least one; 0 for none. Of
+    judgements all is checked, and nothing simulated again."""
     seed: Seed = 0
     """Seed of the random choice of the sample that is computed again."""

@@ -207,12 +207,25 @@ def pyarrow() -> Any:
 @TIME_SPENT.on("files")
 def parquet_bytes(name: TableName, rows: Sequence[RowCells], tables: Tables) -> bytes:
     """Encode the cells of one table's rows as the bytes of a file, sorted by their keys."""
-    arrow, held = pyarrow(), io.BytesIO()
+    return _bytes_of(_in_order(_as_table(name, rows, tables[name]), name))
+
+
+def table_bytes(name: str, rows: Sequence[RowCells], columns: tuple[TableColumn, ...]) -> bytes:
+    """Encode the cells of rows as the bytes of a file, in their order."""
+    return _bytes_of(_as_table(name, rows, columns))
+
+
+def _as_table(name: str, rows: Sequence[RowCells], columns: tuple[TableColumn, ...]) -> Any:
+    arrow = pyarrow()
     try:
-        table = arrow.Table.from_pylist(list(rows), schema=schema_of(tables[name]))
+        return arrow.Table.from_pylist(list(rows), schema=schema_of(columns))
     except (arrow.ArrowInvalid, arrow.ArrowTypeError) as error:
         raise InputError(f"table {name}: a cell does not fit its column: {error}") from error
-    arrow.parquet.write_table(_in_order(table, name), held, **PARQUET_OPTIONS)
+
+
+def _bytes_of(table: Any) -> bytes:
+    held = io.BytesIO()
+    pyarrow().parquet.write_table(table, held, **PARQUET_OPTIONS)
     return held.getvalue()
 
 
@@ -228,7 +241,7 @@ def _in_order(table: Any, name: TableName) -> Any:
 
 def each_batch(path: Path, name: TableName, tables: Tables) -> Iterator[Any]:
     """Yield the rows of a file as Arrow's record batches, without holding all of them in memory."""
-    with _opened(path, name, tables) as file:
+    with opened_table(path, name, tables[name]) as file:
         yield from file.iter_batches(GROUP_ROWS)
 
 
@@ -241,17 +254,17 @@ def joined(paths: Iterable[Path], name: TableName, tables: Tables) -> Any:
 
 def read_table(path: Path, name: TableName, tables: Tables) -> Any:
     """Read a file as an Arrow table and check all of its checksums."""
-    with _opened(path, name, tables) as file:
+    with opened_table(path, name, tables[name]) as file:
         return file.read()
 
 
 @contextmanager
-def _opened(path: Path, name: TableName, tables: Tables) -> Generator[Any]:
-    """Open a file of one of the tables; any damage is raised as an `InputError`."""
+def opened_table(path: Path, name: str, columns: tuple[TableColumn, ...]) -> Generator[Any]:
+    """Open a file of a table with some columns; any damage is raised as an `InputError`."""
     arrow = pyarrow()
     try:
         with arrow.parquet.ParquetFile(path, page_checksum_verification=True) as file:
-            came, wanted = file.schema_arrow, schema_of(tables[name])
+            came, wanted = file.schema_arrow, schema_of(columns)
             if came.names != wanted.names or came.types != wanted.types:
                 what = "column types" if came.names == wanted.names else "columns"
                 raise InputError(

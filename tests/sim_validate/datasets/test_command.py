@@ -22,7 +22,7 @@ OBJECTS = ("tetrahedron", "wedge")
 def dataset(tmp_path_factory):
     folder = tmp_path_factory.mktemp("made") / "ds"
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr("sim_validate.datasets.command.local_processes", here)
+        patched.setattr("sim_validate.datasets.clusters.local_processes", here)
         words = ["dataset", "build", *OBJECTS, *LIGHT, "--out", str(folder), "-q"]
         assert main(words) == Exit.GOOD
     return folder

@@ -73,7 +73,7 @@ def test_rows_that_do_not_arrive_end_the_run(staging):
             return super().submit(function, dataclasses.replace(given, compute=lambda *_: None))
 
     with pytest.raises(WorkerError, match="rows that do not appear"):
-        compute_all(units_of(CONFIG), staging, Elsewhere(), silent)
+        compute_all(units_of(CONFIG), staging, Elsewhere(), silent, None, compute_unit)
 
 
 def test_a_full_disk_ends_the_run_and_later_it_goes_on(tmp_path):
