@@ -19,8 +19,6 @@ from sim_validate.execution.verdict import ExecutionTrial as ExecutionTrial
 from sim_validate.execution.verdict import load_executions as load_executions
 from sim_validate.hands.dexgraspbench import DexRecord as DexRecord
 from sim_validate.hands.dexgraspbench import dex_record as dex_record
-from sim_validate.hands.dexgraspbench import load_dex_record as load_dex_record
-from sim_validate.hands.dexgraspbench import reach_of_record as reach_of_record
 from sim_validate.hands.dexgraspbench import write_dex_object as write_dex_object
 from sim_validate.hands.dexgraspbench import write_dex_record as write_dex_record
 from sim_validate.hands.execute import execute_hand as execute_hand
@@ -28,6 +26,7 @@ from sim_validate.hands.execute import hand_execution_settings as hand_execution
 from sim_validate.hands.validate import hand_setup as hand_setup
 from sim_validate.hands.validate import validate_hand as validate_hand
 from sim_validate.hands.verdict import HandVerdict as HandVerdict
+from sim_validate.judge.sets import judge_records as judge_records
 from sim_validate.planning.regions import load_regions as load_regions
 from sim_validate.protocols.judging import Judgement as Judgement
 from sim_validate.protocols.judging import judge_by as judge_by
@@ -35,6 +34,9 @@ from sim_validate.protocols.judging import judge_hand_by as judge_hand_by
 from sim_validate.protocols.published import PublishedProtocol as PublishedProtocol
 from sim_validate.protocols.published import protocol as protocol
 from sim_validate.protocols.published import protocol_names as protocol_names
+from sim_validate.protocols.settings import JudgeSettings as JudgeSettings
+from sim_validate.protocols.verdict import Judgements as Judgements
+from sim_validate.protocols.verdict import RecordJudgement as RecordJudgement
 from sim_validate.report.charts import margin_figure as margin_figure
 from sim_validate.report.charts import wrench_figure as wrench_figure
 from sim_validate.report.report import write_report as write_report

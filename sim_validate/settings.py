@@ -27,6 +27,10 @@ from grasp_core.messages import FieldError
 from grasp_core.settings import Settings
 from scenes.settings import SAMPLE_S, HeldSettings
 
+ProtocolName: TypeAlias = Literal[
+    "dexgraspbench", "dexgraspbench-paper", "dexonomy", "mj-grasp-sim", "molmospaces"
+]
+"""Names of published tests of grasps."""
 USUAL_FRICTION = 0.5
 """Coulomb coefficient where none is given."""
 Duration = Annotated[float, Interval(ge=0.05, le=60.0)]

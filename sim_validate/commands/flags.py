@@ -6,7 +6,7 @@ This module imports nothing that is slow to load, so that help and usage errors 
 
 from dataclasses import KW_ONLY, field
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 from annotated_types import Interval
 from pydantic import AfterValidator
@@ -49,13 +49,6 @@ AtFriction = Annotated[
 ]
 FirstOnly = Annotated[Count | None, arg(help="Take only this many grasps, from the first.")]
 SixNumbers = Annotated[tuple[float, float, float, float, float, float], AfterValidator(nonzero)]
-ProtocolName = Literal[
-    "dexgraspbench",
-    "dexgraspbench-paper",
-    "dexonomy",
-    "mj-grasp-sim",
-    "molmospaces",
-]
 BARE = arg(name="", help="")
 """Mark of a group whose flags have no prefix; groups inside it keep theirs."""
 

@@ -26,11 +26,16 @@ from sim_validate.commands.flags import (
     ObjectName,
     Planning,
     Positive,
-    ProtocolName,
     Spoken,
 )
 from sim_validate.processes.workers import available_cores
-from sim_validate.settings import Certifying, ChosenExecution, ChosenTrials, Holding
+from sim_validate.settings import (
+    Certifying,
+    ChosenExecution,
+    ChosenTrials,
+    Holding,
+    ProtocolName,
+)
 
 RUN_LIMIT = 100
 """Number of grasps that `run` simulates by default, which takes some ten seconds."""

@@ -74,6 +74,10 @@ COMMANDS: Mapping[str, Command] = {
         "hands.flags:Reach", "protocols.judging_command:judge_reach",
         "Look for poses in which a hand stands in grasps: palm pose and joints, checked exactly.",
     ),
+    "judge": Command(
+        "judge.flags:JudgeFlags", "judge.command:judge_files",
+        "Judge recorded grasps, whoever made them: proofs, published tests, and our own trial.",
+    ),
     "hand": Command(
         "hands.flags:ShownHand", "hands.command:show_hand",
         "Show what a hand was read as: fingers, joints with ranges and torque limits, fingertips.",
@@ -87,8 +91,9 @@ COMMANDS: Mapping[str, Command] = {
         "Judge grasps made by another tool, simulate them, and write them as a dataset.",
     ),
     "dataset verify": Command(
-        "datasets.flags:VerifyFlags", "datasets.command:verify_dataset",
-        "Check files and rows of a dataset, prove force closure again, and redo a sample.",
+        "datasets.flags:VerifyFlags", "judge.command:verify_folder",
+        "Check files and rows of a dataset, prove force closure again, and redo a sample; or check "
+        "the judgements of records.",
     ),
     "baseline record": Command(
         "baselines.flags:RecordFlags", "baselines.command:record_baseline",
@@ -149,6 +154,9 @@ transfer plan/grasps.json part-v2.stl --unit mm --distance-m 0.005 --angle-deg 2
 reach plan/grasps.json --hand allegro --out reached
 reach plan/grasps.json --hand my_hand.xml --fingertips ff,mf,rf,th --table-down 0 0 -1
 reach plan/grasps.json --hand leap --simulate --protocol dexgraspbench --out reached
+judge grasps/ --hand allegro --objects meshes/ --out judged
+judge grasps.npz --hand my_hand.xml --objects mug.obj --test dexonomy --no-trial --out judged
+judge dexgraspnet/ --hand my_hand.xml --objects meshes/ --object "*mug*" --limit 100 --out judged
 hand allegro
 hand my_hand.xml --fingertips ff,mf,rf,th
 inspect part.stl --unit mm
@@ -167,6 +175,7 @@ dataset build meshes/ wedge --frictions 0.3,0.5 --limit 20 --out ds
 dataset build ds/config.toml --out again
 dataset import contacts.json mug.obj --out judged
 dataset verify ds
+dataset verify judged
 baseline record grasps.json -o wedge.baseline.json
 baseline check wedge.baseline.json --strict
 """.splitlines()

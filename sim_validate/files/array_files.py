@@ -1,7 +1,8 @@
 """Reads and writes named arrays in npz files.
 
 An archive may claim any size, or hold a name twice: that is checked before anything is read. Only
-arrays of numbers and truth values are read, and nothing in a file is executed.
+arrays of numbers and truth values are read, or also of texts where they are asked for, and nothing
+in a file is executed.
 """
 
 import io
@@ -21,8 +22,8 @@ MOST_ARRAY_BYTES = 256 * 2**20
 MOST_MEMBERS = 256
 MOST_HEADER = 10_000
 """Largest number of characters in an array's header, a limit of numpy's."""
-ARRAY_KINDS = "biuf"
-"""Kinds of arrays that are read: truth values and numbers."""
+ARRAY_KINDS, TEXT_KIND = "biuf", "U"
+"""Kinds of arrays that are read, truth values and numbers, and of those of texts."""
 ZIP_MAGIC, MEMBER_ENDING = b"PK\x03\x04", ".npy"
 
 
@@ -33,7 +34,9 @@ def read_arrays(path: Path, names: Collection[str]) -> dict[str, NDArray[Any]]:
         return arrays_of(data, names)
 
 
-def arrays_of(data: bytes, names: Collection[str]) -> dict[str, NDArray[Any]]:
+def arrays_of(
+    data: bytes, names: Collection[str], *, kinds: str = ARRAY_KINDS
+) -> dict[str, NDArray[Any]]:
     """Read the named arrays that exist from the bytes of an npz file."""
     if not data.startswith(ZIP_MAGIC):
         raise InputError(
@@ -43,7 +46,7 @@ def arrays_of(data: bytes, names: Collection[str]) -> dict[str, NDArray[Any]]:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             members = _checked(archive.infolist())
             return {
-                name: _array(archive, members[name + MEMBER_ENDING], name)
+                name: _array(archive, members[name + MEMBER_ENDING], name, kinds)
                 for name in names
                 if name + MEMBER_ENDING in members
             }
@@ -73,12 +76,14 @@ def _checked(listed: list[zipfile.ZipInfo]) -> dict[str, zipfile.ZipInfo]:
     return members
 
 
-def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo, name: str) -> NDArray[Any]:
+def _array(
+    archive: zipfile.ZipFile, member: zipfile.ZipInfo, name: str, kinds: str
+) -> NDArray[Any]:
     with archive.open(member) as stream:
         found: NDArray[Any] = np.lib.format.read_array(
             stream, allow_pickle=False, max_header_size=MOST_HEADER
         )
-        if found.dtype.kind not in ARRAY_KINDS or stream.read(1):
+        if found.dtype.kind not in kinds or stream.read(1):
             raise InputError(
                 f"{name}: expected an array of numbers with nothing behind them, got one of "
                 f"{shown(str(found.dtype))}; save it again"

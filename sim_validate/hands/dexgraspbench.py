@@ -20,38 +20,31 @@ src/task/eval_func/base.py, src/util/hand_util.py, and its assets/hand, with MuJ
 """
 
 import io
-import math
-import pickle
 from collections.abc import Mapping
-from dataclasses import field
-from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, TypeAlias, cast
+from typing import Annotated, Any, TypeAlias
 
 import numpy as np
 from annotated_types import Len
 from pydantic import AfterValidator, Field
 
-from grasp_core.allowed_values import Friction, Quantity, instance, number, path_of, value_of
+from grasp_core.allowed_values import Quantity, instance, path_of, value_of
 from grasp_core.arrays import Array, Shape, to_digits
 from grasp_core.by_value import summary
-from grasp_core.closure.force_closure import force_closure
 from grasp_core.declared import Declared, declared
-from grasp_core.errors import InputError, about
-from grasp_core.files.json_text import shown, text_of
-from grasp_core.files.records import from_record, keys, record_of
-from grasp_core.files.text_files import read_bytes, write_parts, write_text
-from grasp_core.hands.collisions import tip_gaps
+from grasp_core.errors import InputError
+from grasp_core.files.json_text import text_of
+from grasp_core.files.records import record_of
+from grasp_core.files.text_files import write_parts, write_text
 from grasp_core.hands.hand import PALM_NAME, Hand
-from grasp_core.hands.hand_arrays import places, tip_jacobians
+from grasp_core.hands.hand_arrays import places
 from grasp_core.hands.hand_motors import hand_motors
 from grasp_core.hands.reach import HandReach, Stance, stance_of, uncoupled
 from grasp_core.messages import UnfitError
-from grasp_core.objects.on_faces import check_body, face_under
+from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron, is_convex
-from grasp_core.values import Contact
 from scenes.mujoco.mjcf_text import IDENTITY_POSE, quaternion, rotations
-from scenes.mujoco.published_tests import HandServos, Postures
+from scenes.mujoco.published_tests import HandServos
 
 ROOT_POSE = 7
 """Numbers of a pose: position and quaternion."""
@@ -107,128 +100,6 @@ class DexRecord(Declared):
 
     def __repr__(self) -> str:
         return summary("DexRecord", self.object_path, joints=len(self.grasp) - ROOT_POSE)
-
-
-WANTED = keys(DexRecord)
-
-
-def load_dex_record(path: str | Path) -> DexRecord:
-    """Read a record of DexGraspBench; nothing in the file is executed.
-
-    Args:
-        path: A `.npy` file with a dictionary.
-
-    Raises:
-        InputError: The file cannot be read, or lacks a field.
-    """
-    place = path_of(path, "path")
-    data = read_bytes(place, MOST_RECORD_BYTES)
-    with about(place):
-        return _record(_unpickled(data))
-
-
-class _Numbers:
-    """An array in a pickle: its values come later, as its state."""
-
-    def __init__(self, *_: Any) -> None:
-        self.values: Array | list[Any] | None = None
-
-    def __setstate__(self, state: Any) -> None:
-        _, shape, kind, by_columns, data = state
-        own = kind.plain.kind == "O"
-        self.values = list(data) if own else _filled(data, kind, shape, "F" if by_columns else "C")
-
-
-class _Kind:
-    """The type of an array's entries in a pickle."""
-
-    def __init__(self, code: Any, *_: Any) -> None:
-        self.plain = np.dtype(str(code))
-        if self.plain.kind not in "fiubO":
-            raise InputError(f"an array has the type {shown(str(code))}, expected numbers")
-
-    def __setstate__(self, state: Any) -> None:
-        self.plain = self.plain.newbyteorder(state[1])
-
-
-def _filled(data: Any, kind: Any, shape: tuple[int, ...], order: Any) -> Array:
-    if kind.plain.kind == "O" or math.prod(shape) * kind.plain.itemsize != len(data):
-        raise InputError(f"an array has {len(data)} bytes, which do not fit the shape {shape}")
-    return np.frombuffer(data, kind.plain).reshape(shape, order=order)
-
-
-def _scalar(kind: Any, data: Any) -> Array:
-    return _filled(data, kind, (), "C")
-
-
-ALLOWED: dict[str, Any] = {"numpy.ndarray": _Numbers, "numpy.dtype": _Kind}
-for core in ("numpy.core", "numpy._core"):
-    ALLOWED[f"{core}.multiarray._reconstruct"] = _Numbers
-    ALLOWED[f"{core}.multiarray.scalar"] = _scalar
-    ALLOWED[f"{core}.numeric._frombuffer"] = _filled
-"""What makes plain values in place of the functions that NumPy 1 and 2 name in pickles. NumPy's own
-would trust the state that a file gives them."""
-
-
-class _Unpickler(pickle.Unpickler):
-    def find_class(self, module: str, name: str, /) -> Any:
-        make = ALLOWED.get(f"{module}.{name}")
-        if make is None:
-            raise InputError(
-                f"the file names {shown(f'{module}.{name}')}, which is not looked up; save plain "
-                "dictionaries of arrays, numbers and text"
-            )
-
-        def made(*given: Any) -> Any:  # a new one: files can set attributes of what they get
-            return make(*given)
-
-        return made
-
-
-def _unpickled(data: bytes) -> Any:
-    """Return the value that `numpy.save` has pickled, or a list of several."""
-    stream = io.BytesIO(data)
-    try:
-        read = {
-            (1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0
-        }[np.lib.format.read_magic(stream)]  # fmt: skip
-        shape, _, dtype = read(stream)
-        if dtype.kind != "O":
-            raise InputError(f"expected a dictionary, got an array of numbers of shape {shape}")
-        values = _Unpickler(stream).load().values
-        return values[0] if shape == () else values
-    except InputError:
-        raise
-    except Exception as error:  # a damaged file can make each step raise anything
-        raise InputError(
-            "expected a .npy file in which numpy.save has pickled a plain dictionary "
-            f"({shown(str(error))})"
-        ) from error
-
-
-def _record(found: Any) -> DexRecord:
-    """Make a record of the fields of a dictionary; those that are not known are left alone."""
-    if not isinstance(found, dict):
-        raise InputError(
-            f"expected the dictionary of one grasp, got a {type(found).__name__}. Save each grasp "
-            f"as a file of its own with the fields {', '.join(WANTED)} (docs/hands.md says "
-            "what they are)"
-        )
-    fields = cast("Mapping[str, Any]", found)
-    if missing := [name for name in WANTED if name not in fields]:
-        raise InputError(
-            f"the dictionary has no {missing[0]}; records have {', '.join(WANTED)}. Records of "
-            "arms (approach_qpos alone), and batches, are not read"
-        )
-    return from_record(DexRecord, {name: _plain(fields[name]) for name in WANTED})
-
-
-def _plain(found: Any) -> Any:
-    """Return an array as lists, and one with a single number as that number."""
-    values: Any = found.values if isinstance(found, _Numbers) else found
-    if not hasattr(values, "tolist"):
-        return values
-    return values.item() if values.size == 1 else values.tolist()
 
 
 def write_dex_record(record: DexRecord, path: str | Path) -> Path:
@@ -314,13 +185,6 @@ def hand_file(hand: Hand) -> HandServos:
     return HAND_FILES.get(hand.name, HandServos())
 
 
-@declared
-class RecordedReach(HandReach):
-    """What is found of a recorded grasp; tests of other tools judge the record itself."""
-
-    record: DexRecord = field(kw_only=True)
-
-
 def pose_of(seven: Array) -> Array:
     """Return the pose (4, 4) of a position and a quaternion (w, x, y, z) of any length."""
     found = np.eye(4)
@@ -391,94 +255,6 @@ def _opened_by(stance: Stance, opened: Array, gap_m: float) -> Array:
         share, own = float(np.interp(gap, each, shares)), list(joints[finger])
         found[own] = stance.joints[own] + share * (opened - stance.joints)[own]
     return found
-
-
-def reach_of_record(
-    record: DexRecord, hand: Hand, body: Polyhedron, friction: float, *,
-    touch_m: float = TOUCH_M, name: str = "record",
-) -> RecordedReach:  # fmt: skip
-    """Find the contacts of a recorded grasp, and prove whether they are in force closure.
-
-    A fingertip's contact is the point of the surface that is nearest to it, or to its deepest
-    corner, if the fingertip is at most `touch_m` away from the surface or in it. Links other than
-    fingertips are not looked at, and neither are overlaps: a record may hold any pose.
-
-    Args:
-        record: The recorded grasp.
-        hand: The hand, with its joints in the order of the record.
-        body: The object, its lengths multiplied by the record's scale.
-        friction: Coulomb coefficient at every contact.
-        touch_m: Largest gap or overlap of a fingertip that counts as touching [m].
-        name: Id of the grasp.
-
-    Returns:
-        The pose with its contacts and proof; or `no closure` with a proof, or `not found` where
-        fewer than three fingertips touch. `judge_hand_by` judges the record in each case.
-
-    Raises:
-        InputError: The record has not as many joints as the hand.
-    """
-    instance(record, DexRecord, "record", "load_dex_record reads one")
-    instance(hand, Hand, "hand", "load_hand makes one")
-    check_body(body)
-    value_of(Friction, friction, "friction")
-    number(touch_m, "touch_m", ge=0.0, le=1.0)
-    value_of(str, name, "name")
-    joints = record.grasp[ROOT_POSE:]
-    if len(joints) != len(hand.joints):
-        raise InputError(
-            f"record must have the {len(hand.joints)} joints of {hand.name}, got {len(joints)}; "
-            "give the hand that was recorded"
-        )
-    palm = _palms(record, hand)[1]
-    found = partial(RecordedReach, hand.name, name, record=record)
-    touching, contacts = _touched(hand, body, joints, palm, touch_m)
-    if len(touching) < FEWEST_TIPS:
-        said = f"only {len(touching)} fingertips are within {1e3 * touch_m:g} mm of the surface"
-        return found("not found", said, 1, 0.0)
-    proof = force_closure(contacts, friction=friction)
-    if not proof.closed:
-        said = f"the contacts of {len(touching)} fingertips are proved not to be in force closure"
-        return found("no closure", said, 1, 0.0, open_choices=(proof,))
-    return found(
-        "", "", 1, 0.0, np.array(touching), joints, palm, proof,
-        pregrasp=record.pregrasp[ROOT_POSE:], used=np.arange(len(touching)),
-    )  # fmt: skip
-
-
-def recorded_postures(reach: RecordedReach, hand: Hand, servo_n_m_per_rad: float) -> Postures:
-    """Return a record's postures, with the pushes that best explain the torques of its squeeze."""
-    if reach.hand != hand.name:
-        raise InputError(f"hand must be the recorded one, {reach.hand}, got {hand.name}")
-    record = reach.record
-    kept = record.pregrasp, record.grasp, record.squeeze
-    joints = np.array([each[ROOT_POSE:] for each in kept])
-    palms = _palms(record, hand)
-    torques = servo_n_m_per_rad * (joints[2] - joints[1])
-    J = tip_jacobians(hand, joints[1], palms[1])[0].reshape(-1, len(torques))
-    forces = np.asarray(np.linalg.lstsq(J.T, torques, rcond=None)[0], dtype=np.float64)
-    axes = pose_of(record.object_pose)[:3, :3].T
-    return Postures(palms, joints, np.linalg.norm(forces.reshape(-1, 3), axis=1), axes=axes)
-
-
-def _palms(record: DexRecord, hand: Hand) -> Array:
-    """Return the poses of the palm in the object's frame, open, touching and squeezing."""
-    roots = [pose_of(each) for each in (record.pregrasp, record.grasp, record.squeeze)]
-    return np.linalg.inv(pose_of(record.object_pose)) @ np.array(roots) @ hand_file(hand).root
-
-
-def _touched(
-    hand: Hand, body: Polyhedron, joints: Array, palm: Array, touch_m: float
-) -> tuple[list[int], tuple[Contact, ...]]:
-    gaps, on_tips, on_object = tip_gaps(hand, body, joints, palm, np.arange(len(hand.fingers)))
-    fingers, contacts = np.flatnonzero(np.abs(gaps) <= touch_m).tolist(), list[Contact]()
-    for finger in fingers:
-        point = on_object[finger]
-        way = point - on_tips[finger]
-        away = Contact(point, way / float(np.linalg.norm(way)))
-        face = face_under(body, away)
-        contacts.append(away if face is None else Contact(point, np.array(face.normal)))
-    return fingers, tuple(contacts)
 
 
 def write_dex_object(body: Polyhedron, folder: str | Path) -> Path:

@@ -20,10 +20,10 @@ from sim_validate.commands.flags import (
     GraspId,
     GraspsPath,
     Jobs,
-    ProtocolName,
     Spoken,
 )
 from sim_validate.processes.workers import available_cores
+from sim_validate.settings import ProtocolName
 
 HandOrFile = Annotated[str, arg(help=f"The hand: {', '.join(HANDS)}, or an MJCF or URDF file.")]
 FingertipNames = Annotated[str, arg(metavar="NAME,NAME,...", help=(

@@ -46,7 +46,7 @@ from sim_validate.engine.schedules import samples
 from sim_validate.engine.setup import Setup
 from sim_validate.engine.stepping import Bench, Motion, Told
 from sim_validate.execution.execute import given_contacts
-from sim_validate.hands.dexgraspbench import RecordedReach, hand_file, recorded_postures
+from sim_validate.hands.dexgraspbench import hand_file
 from sim_validate.hands.known_hand import KnownHand
 from sim_validate.hands.validate import hand_setup
 from sim_validate.processes.own_faults import OWN_FAULTS
@@ -120,15 +120,14 @@ def judge_hand_by(
 ) -> Judgement:
     """Judge a hand that stands in a grasp by a published test.
 
-    A pose of `reach_of_record` is judged as its record says, with its own way in and its own
-    squeeze, whether or not its contacts are in force closure; motors have no limits in their test,
-    as there. Any other pose squeezes with 0.6 of what its motors can.
+    It squeezes with 0.6 of what its motors can. Records of other tools, with a squeeze of their
+    own, are judged by `judge_records`.
 
     Args:
         protocol: The test, or its name (see `protocol_names`).
         hand: The hand, with a torque limit for each joint (`hand.with_torque_limits`).
         body: The object.
-        reach: The pose in which the hand stands (see `gc.reach_with` and `reach_of_record`).
+        reach: The pose in which the hand stands (see `gc.reach_with`).
         friction: Coulomb coefficient of our verdict and of the prediction.
         setup: How our trials are simulated; None for that of `hand_setup`.
 
@@ -148,10 +147,7 @@ def judge_hand_by(
     if not found.own_servos:
         servos = replace(servos, stiffness_n_m_per_rad=found.servo_n_m_per_rad)
     tested = _tested(found, body)
-    if isinstance(reach, RecordedReach):
-        postures = recorded_postures(reach, hand, servos.stiffness_n_m_per_rad)
-    else:
-        postures = tested.postures(hand, reach, servos.stiffness_n_m_per_rad)
+    postures = tested.postures(hand, reach, servos.stiffness_n_m_per_rad)
     scene = tested.by_hand(hand, postures, servos)
     ours = _ours(hand, body, reach, friction, found.forces(scene.mass_kg), setup)
     return _judged(found, scene, friction, setup, ours, reach.grasp, hand.name)
@@ -174,9 +170,7 @@ def _ours(
     hand: Hand, body: Polyhedron, reach: HandReach, friction: float, forces: tuple[Array, ...],
     setup: Setup,
 ) -> OurVerdict:  # fmt: skip
-    """Judge a hand by our trials; contacts that were proved open need none."""
-    if isinstance(reach, RecordedReach) and not reach.reached:
-        return OurVerdict(False, False, 0.0, reach.explanation)
+    """Judge a hand by our trials."""
     checked(ClosureCase.of(setup, friction, body.radius))
     checked(KnownHand.of(setup, friction))
     held = build_hand_scene(hand, body, reach, friction, physics=setup.physics)
@@ -245,18 +239,36 @@ def their_verdict(
     protocol: PublishedProtocol, scene: TestedScene, threads: int = 1
 ) -> tuple[RunVerdict, ...]:
     """Simulate all runs of a test and judge each."""
-    bench = Bench(scene, threads=threads, chunk=PUBLISHED_STEPS, kept=("state",))
-    begun = np.concatenate([IDENTITY_POSE, scene.opened if protocol.close_s else scene.shut])
+    return their_verdicts(protocol, [scene], threads)[0]
+
+
+def their_verdicts(
+    protocol: PublishedProtocol, scenes: Sequence[TestedScene], threads: int = 1
+) -> list[tuple[RunVerdict, ...]]:
+    """Simulate all runs of a test with scenes of one text, which are told different things."""
+    bench = Bench(scenes[0], threads=threads, chunk=PUBLISHED_STEPS, kept=("state",))
     root = POSE_END * bench.moves_as_told  # where one moves as told, its pose comes first
-    runs = [
-        replace(run, mocap=run.commands[:, :root] if root else None,
-                commands=run.commands[:, root:], joints=begun)
-        for run in (timeline(protocol, scene, steps) for steps in protocol.runs)
+    moving = len(bench.home) - POSE_END
+    runs = list[Timeline]()
+    for scene in scenes:
+        begun = scene.opened if protocol.close_s else scene.shut
+        joints = np.concatenate([IDENTITY_POSE, begun[len(begun) - moving :]])
+        runs += [
+            replace(run, mocap=run.commands[:, :root] if root else None,
+                    commands=run.commands[:, root:], joints=joints)
+            for run in (timeline(protocol, scene, steps) for steps in protocol.runs)
+        ]  # fmt: skip
+    motions = bench.simulated(runs)
+    judged = [
+        judged_run(place % len(protocol.runs),
+                   [] if motion.health.fault else looked(bench, motion, run.looks),
+                   motion.health.fault, protocol.passing)
+        for place, (motion, run) in enumerate(zip(motions, runs, strict=True))
     ]  # fmt: skip
-    return tuple(
-        judged_run(number, looked(bench, motion, run.looks), motion.health.fault, protocol.passing)
-        for number, (motion, run) in enumerate(zip(bench.simulated(runs), runs, strict=True))
-    )
+    return [
+        tuple(judged[first : first + len(protocol.runs)])
+        for first in range(0, len(judged), len(protocol.runs))
+    ]
 
 
 def looked(bench: Bench[TestedScene], motion: Motion, looks: Sequence[int]) -> list[Glance]:

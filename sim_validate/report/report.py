@@ -22,9 +22,13 @@ from grasp_core.messages import MILLI
 from grasp_core.provenance import versions
 from grasp_core.values import Grasp
 from scenes.drawing.pages import (
+    BAD_TONE,
+    GOOD_TONE,
     NO_VALUE,
     Fact,
+    TemplateData,
     as_text,
+    facts_of,
     filled,
     grasp_data,
     grasp_facts,
@@ -49,15 +53,7 @@ from sim_validate.report.charts import (
     quadrants_in,
     wrench_size,
 )
-from sim_validate.report.run_folder import (
-    BAD_TONE,
-    GOOD_TONE,
-    Findings,
-    RunFolder,
-    folder_of,
-    runs_in,
-)
-from sim_validate.report.sections import TemplateData
+from sim_validate.report.run_folder import Findings, RunFolder, folder_of, runs_in
 
 ASSETS = Path(__file__).parent / "assets"
 PERCENT = 100.0
@@ -230,7 +226,7 @@ def _facts(found: Findings) -> Iterable[Fact]:
         name = "Point between the lines of pair" if grasp.family == "regulus" else "Focus"
         yield f"{name} {place}", f"({millimetres(focus)}) mm", FOCUS_MEANING if place == 0 else ""
     if verdict is not None:
-        yield from sections.facts_of(verdict, TITLE_FIGURES)
+        yield from facts_of(verdict, TITLE_FIGURES)
         if (repeats := verdict.robustness) is not None:
             low, high = repeats.interval
             said = f"held {repeats.held} of {len(repeats.trials)} times"

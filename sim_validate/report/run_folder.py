@@ -14,6 +14,7 @@ from grasp_core.planning.grasps_json import load_grasps
 from grasp_core.planning.result import Plan
 from grasp_core.values import Grasp
 from scenes.drawing.hands import PosedHand, posed_hand
+from scenes.drawing.pages import BAD_TONE, GOOD_TONE, QUIET_TONE
 from sim_validate.closure.verdict import Verdict, Verdicts
 from sim_validate.engine.held_or_let_go import LET_GO, Outcome
 from sim_validate.execution.verdict import ExecutedGrasp, Executions
@@ -24,7 +25,6 @@ from sim_validate.protocols.verdict import Judgements
 if TYPE_CHECKING:
     from sim_validate.hands.reaches import ReachedGrasp, Reaches
 
-GOOD_TONE, BAD_TONE, QUIET_TONE = "good", "bad", "quiet"
 File = TypeVar("File", bound=RecordFile)
 Item = TypeVar("Item", bound=Named)
 
@@ -230,7 +230,7 @@ def _read(folder: Path, kind: type[File], saved: Plan) -> File | None:
 
 def _check_about(path: Path, found: Any, saved: Plan) -> None:
     """Refuse a file about another object, or that lists a grasp twice or with other contacts."""
-    if found.object.content_sha256 != saved.body.content_sha256:
+    if found.object is None or found.object.content_sha256 != saved.body.content_sha256:
         raise InputError(
             f"{path}: the file is about another object than {GRASPS} beside it; write it again, "
             "or remove it"

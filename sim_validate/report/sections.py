@@ -2,9 +2,9 @@
 
 import math
 import shlex
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,7 +13,16 @@ from grasp_core.figures import NONE, Figure, figures
 from grasp_core.files.records import record_of
 from grasp_core.messages import MILLI
 from grasp_core.names import HANDS
-from scenes.drawing.pages import Fact, number
+from scenes.drawing.pages import (
+    BAD_TONE,
+    GOOD_TONE,
+    QUIET_TONE,
+    Fact,
+    TemplateData,
+    facts_of,
+    number,
+    records_table,
+)
 from sim_validate.commands.config_file import flags_from
 from sim_validate.commands.simulation_flags import ExecuteFlags
 from sim_validate.execution.verdict import (
@@ -25,19 +34,12 @@ from sim_validate.execution.verdict import (
     totals_in_words,
 )
 from sim_validate.hands.flags import Reach
-from sim_validate.report.run_folder import (
-    BAD_TONE,
-    GOOD_TONE,
-    QUIET_TONE,
-    Findings,
-    said_of_execution,
-)
+from sim_validate.report.run_folder import Findings, said_of_execution
 from sim_validate.settings import ExecutionSettings
 
 if TYPE_CHECKING:
     from sim_validate.hands.reaches import ReachedGrasp, Reaches
 
-TemplateData: TypeAlias = Mapping[str, Any]
 REASONS = {
     "collision": "a collision",
     "limit": "a joint's limit",
@@ -147,13 +149,6 @@ def _enough(found: ExecutedGrasp) -> Iterable[Fact]:
         yield "What would be enough", str(found.enough), ""
 
 
-def facts_of(record: object, but: Sequence[str]) -> Iterable[Fact]:
-    """Yield the figures that a record has, but for those that the page says in other places."""
-    for each in figures(type(record)):
-        if each.name not in but and each.of(record) is not None:
-            yield each.shown.heading, each.cell(record), each.explained
-
-
 def _of_hand(record: object, part: str = "") -> Iterable[Fact]:
     for heading, cell, meaning in facts_of(record, HAND_TITLE_FIGURES):
         said = f"{part}{heading}"
@@ -239,24 +234,3 @@ def _execution_facts(executions: Executions, found: ExecutedGrasp | None) -> Ite
     for figure in EXECUTION_FIGURES:
         yield figure.shown.heading, figure.cell(found), figure.explained
     yield from _enough(found)
-
-
-def records_table(records: Sequence[object], kind: type) -> TemplateData:
-    """Build a table of the figures of records, for the template `records.html`.
-
-    A figure that is true is good, and one that is false is bad. Those that no record has are left
-    out.
-    """
-    listed = [each for each in figures(kind) if any(each.of(one) is not None for one in records)]
-    tones = {True: GOOD_TONE, False: BAD_TONE}
-    return {
-        "columns": [(figure.shown.heading, figure.explained) for figure in listed],
-        "rows": [
-            [
-                (figure.cell(one), tones[value] if isinstance(value, bool) else "")
-                for figure in listed
-                for value in [figure.of(one)]
-            ]
-            for one in records
-        ],
-    }

@@ -26,7 +26,7 @@ from tests.public_values.bad_values import (
     optional,
     unless,
 )
-from tests.public_values.call import WRENCH, Call, body, fields_of, grasp, reading
+from tests.public_values.call import WRENCH, Call, body, fields_of, grasp
 
 GRAVITY = np.array([0.0, 0.0, -9.8])
 
@@ -212,14 +212,6 @@ CALLS = [
     }, {
         "servo_n_m_per_rad": optional(POSITIVE), "gap_m": optional(POSITIVE),
     }),
-    Call("sv.reach_of_record", lambda: {
-        "record": record(), "hand": hinged_hand(), "body": cube(), "friction": 0.5,
-    }, {
-        "hand": VALUE | {"another": gc.load_hand("leap")},
-        "touch_m": NOT_NEGATIVE,
-    }),
-    reading("sv.load_dex_record", "no/such/0.npy",
-            "tests/sim_validate/hands/test_dexgraspbench.py"),
     Call("sv.write_dex_record", lambda: {"record": record(), "path": "no/such/0.npy"},
          succeeds_in="tests/sim_validate/hands/test_dexgraspbench.py"),
     Call("sv.write_dex_object", lambda: {"body": body(), "folder": "no/such"}, {

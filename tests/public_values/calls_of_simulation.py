@@ -75,6 +75,16 @@ CALLS = [
         "autoreset": SWITCH,
         "diagexact": SWITCH, "multiccd": SWITCH,
     }),
+    Call("sv.judge_records", lambda: {
+        "paths": ["no/such/file.npy"], "hand": "allegro", "objects": "no/such/folder",
+    }, {
+        "paths": SEVERAL, "hand": optional(PATH), "objects": PATH, "settings": optional(VALUE),
+        "format": optional(WORD),
+    }, succeeds_in="tests/sim_validate/judge/test_sets.py"),
+    Call("sv.JudgeSettings", dict, {
+        "touch_m": NOT_NEGATIVE, "push_n": POSITIVE, "mass_kg": POSITIVE, "trial": SWITCH,
+        "tests": SEVERAL | {"unknown": ("nonsense",), "twice": ("dexonomy", "dexonomy")},
+    }),
     Call("sv.load_dataset", lambda: {"folder": "no/such/folder"}, {
         "folder": PATH | {"nowhere": "no/such/folder"}, "split": optional(WORD),
     }, succeeds_in="tests/sim_validate/datasets/test_loading.py"),

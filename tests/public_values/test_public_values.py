@@ -23,7 +23,7 @@ MADE_BY_FUNCTIONS = {
     "WrenchLimit",
     "scenes": "HandScene HeldScene Layout Scene Sheet Turntable",
     "sv": "ExecutedGrasp Execution ExecutionTrial Executions HandVerdict Judgement "
-    "PublishedProtocol Verdict Verdicts",
+    "Judgements PublishedProtocol RecordJudgement Verdict Verdicts",
 }
 """Results, by package: users read them and do not make them."""
 NAMED_OTHERWISE = {

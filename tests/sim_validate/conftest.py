@@ -13,7 +13,7 @@ from tests.sim_validate.datasets import engines
 @pytest.fixture
 def built_here(monkeypatch):
     """Let `dataset build` and `dataset import` compute their units in this process."""
-    monkeypatch.setattr("sim_validate.datasets.command.local_processes", engines.here)
+    monkeypatch.setattr("sim_validate.datasets.clusters.local_processes", engines.here)
 
 
 @pytest.fixture

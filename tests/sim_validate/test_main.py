@@ -20,13 +20,14 @@ from scenes.drawing.pictures import AZIMUTH_DEG, OBJECT_ELEVATION_DEG
 from scenes.example_objects import example_object
 from scenes.settings import EXPORT_ENDINGS, GraspFormat
 from sim_validate.commands.exit_codes import Exit
-from sim_validate.commands.flags import CLIP_TYPES, PAGE_TYPES, PICTURE_TYPES, ProtocolName
+from sim_validate.commands.flags import CLIP_TYPES, PAGE_TYPES, PICTURE_TYPES
 from sim_validate.commands.table import EXAMPLES, GROUPS
 from sim_validate.datasets.config import BuiltInHand
 from sim_validate.engine.held_or_let_go import HoldVerdict, Outcome
 from sim_validate.main import main
 from sim_validate.processes import workers
 from sim_validate.protocols.published import PROTOCOLS
+from sim_validate.settings import ProtocolName
 from tests.grasp_core.curved import bumpy_ellipsoid
 from tests.patience import HANGING_S
 
@@ -117,7 +118,7 @@ def test_a_scale_multiplies_what_a_mesh_file_says(here, answer, capsys):
         (["plan", "wedge", "--fricton", "0.3"], Exit.USAGE, "--friction"),
         (["plna", "wedge"], Exit.USAGE, "no command 'plna'; did you mean plan"),
         (["validte"], Exit.USAGE, "did you mean validate"),
-        (["wedge"], Exit.USAGE, "the commands are run, plan, validate"),
+        (["prism"], Exit.USAGE, "the commands are run, plan, validate"),
         (["dataset", "biuld"], Exit.USAGE, "no command 'dataset biuld'; did you mean build"),
         (["baseline", "check-it"], Exit.USAGE, "did you mean check"),
         (["dataset", "wedge"], Exit.USAGE, "the commands are build, import, verify"),

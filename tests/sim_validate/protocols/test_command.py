@@ -6,7 +6,7 @@ import shutil
 import pytest
 
 from sim_validate.commands.exit_codes import Exit
-from sim_validate.hands.dexgraspbench import load_dex_record
+from sim_validate.judge.formats.reading import read_records
 from sim_validate.main import main
 from sim_validate.protocols.verdict import Judgements
 from tests.sim_validate.changing import at, changed
@@ -119,7 +119,8 @@ def test_a_hand_is_judged_and_its_records_are_written(bracket_plan, tmp_path, ca
     assert "is not convex" in found.err
     names = sorted(path.name for path in (tmp_path / "records" / "graspdata").iterdir())
     assert names == sorted(f"{each}.npy" for each in ids)
-    assert len(load_dex_record(tmp_path / "records" / "graspdata" / names[0]).grasp) == 7 + 16
+    (first,) = read_records([tmp_path / "records" / "graspdata" / names[0]])
+    assert len(first.grasp.joints) == 16
 
 
 def test_a_hand_is_judged_in_simulation_only(bracket_plan, capsys):

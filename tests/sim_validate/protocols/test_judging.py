@@ -8,7 +8,15 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.values import Contact
-from sim_validate.protocols.judging import Glance, judge_by, judge_hand_by, judged_run
+from scenes.mujoco.published_tests import TestedObject
+from scenes.settings import FingerSettings
+from sim_validate.protocols.judging import (
+    Glance,
+    judge_by,
+    judge_hand_by,
+    judged_run,
+    their_verdict,
+)
 from sim_validate.protocols.published import Passing, protocol, protocol_names
 from tests.grasp_core.hands.gripping import FRICTION, reaches, scaled
 
@@ -106,3 +114,15 @@ def test_a_turn_counts_as_an_angle_and_a_fault_of_the_simulator_is_no_pass():
     assert (found.passed, found.turn_deg) == (True, pytest.approx(20.0))
     found = judged_run(0, looks, "it diverged", Passing())
     assert (found.passed, found.reason) == (False, "it diverged")
+
+
+def test_a_run_that_diverges_is_no_pass_and_is_not_looked_at():
+    """Fingers that push a feather with a ton."""
+    usual = protocol("dexgraspbench")
+    coarse = replace(usual, physics=replace(usual.physics, timestep=0.005))
+    tested = TestedObject(BODY, usual.friction, 1e-4, coarse.physics)
+    scene = tested.by_fingertips(GRASP, FingerSettings(max_normal_force_n=1e4))
+    for run in their_verdict(coarse, scene):
+        assert not run.passed
+        assert "the simulator raised" in run.reason
+        assert (run.displacement_m, run.turn_deg, run.fingers) == (0.0, 0.0, 0)

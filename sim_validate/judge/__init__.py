@@ -1,0 +1,1 @@
+"""Judges recorded grasps, whoever made them."""
