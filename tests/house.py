@@ -15,7 +15,7 @@ TOTALS = {
     "lines of packages": 65_849,
     "modules of packages": 338,
     "lines of tests": 45_625,
-    "lines of docs": 4_258,
+    "lines of docs": 4_260,
 }
 """Most that there may be. Who merges lowers a number to what the command prints. A number rises
 only with a line below that says why."""
@@ -25,7 +25,7 @@ RISES = (
     " hand, pages and checks of what is written",
     "lines of tests, 41,548 to 45,625: a test for each of these, beside MuJoCo's own kinematics,"
     " closed forms and hostile files",
-    "lines of docs, 3,986 to 4,258: a page and a notebook about recorded grasps, and their fields",
+    "lines of docs, 3,986 to 4,260: a page and a notebook about recorded grasps, and their fields",
     "lines of packages, 60,554 to 61,173, modules, 300 to 304: gates that are kept, samples"
     " simulated in one call, maps bounded side by side, runs again in two lengths of steps,"
     " processor time by kind of work, and published tests imported where they are asked for",
