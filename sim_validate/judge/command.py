@@ -121,6 +121,12 @@ def _show(found: Judgements, reporter: Reporter) -> None:
     rows = [[each.cell(record) for each in shown] for record in found.records[:TABLE_ROWS]]
     reporter.table("judged records", [each.shown.heading for each in shown], rows)
     say_cut(len(found.records), reporter)
+    apart = sum(bool(each.hand) and not each.links for each in found.records)
+    if 2 * apart > len(found.records):
+        reporter.warn(
+            f"the hand touches no object in {apart} of {len(found.records)} records: check that "
+            "quaternions are in the order w, x, y, z, that lengths are metres, and the scale"
+        )
     failed = [f"{each.id}: {_why(each)}" for each in found.records if not each.good]
     warn_of(failed, JUDGEMENTS, reporter)
     left_out = [f"{name}: not judged: {reason}" for name, reason in found.unjudged.items()]
@@ -128,7 +134,9 @@ def _show(found: Judgements, reporter: Reporter) -> None:
     totals = found.record_summary
     assert totals is not None  # noqa: S101 - records were asked for
     reporter.records("by published test", [*totals.tests.values()])
-    numbers = [(each.shown.heading, _number(each, totals)) for each in figures(RecordTotals)]
+    untried = () if any(each.trial for each in found.records) else ("held", "untrusted")
+    numbers = [(each.shown.heading, _number(each, totals)) for each in figures(RecordTotals)
+               if each.name not in untried]  # fmt: skip
     reporter.table("in all", ("of all records", ""), numbers)
 
 

@@ -20,7 +20,7 @@ class JudgeFlags(Spoken):
     """Flags of the command `judge`."""
 
     records: Positional[tuple[Path, ...]]
-    """Files with recorded grasps, or folders of such files (see docs/hands.md)."""
+    """Files with recorded grasps, or folders of such files (see docs/judge.md)."""
     objects: Path
     """Folder with the objects that records name; or one mesh file, or the name of a built-in
     object, that all records are about."""

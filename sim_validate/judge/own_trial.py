@@ -328,6 +328,7 @@ class ClosedHand:
         far = float(self._moved(motion, watched).max())
         if far < self.trials.setup.hold.hold_threshold * self.size:
             return HeldLoad(name, limit, Outcome.HELD, "", far)
-        return HeldLoad(
-            name, limit, Outcome.SLIPPED, f"the object moved by {MILLI * far:.3g} mm", far
-        )
+        reason = f"the object moved by {MILLI * far:.3g} mm"
+        if 0.0 < limit < 1.0:
+            reason += f"; by the analysis {limit:.3g} of the load is the most that is resisted"
+        return HeldLoad(name, limit, Outcome.SLIPPED, reason, far)

@@ -72,15 +72,16 @@ def placed(record: HandRecord, hand: FiledHand) -> Placed:
     missing = [name for name in known if name not in given]
     unknown = [name for name in given if name not in known]
     if given and (missing or unknown):
+        apart = [f"it lacks {listed(missing)}"] if missing else []
+        apart += [f"the hand has no {listed(unknown)}"] if unknown else []
         raise InputError(
-            f"the record must have the {len(known)} joints of the hand; it lacks "
-            f"{listed(missing) or 'none'}, and {listed(unknown) or 'none'} of it are not the "
-            "hand's; give the hand that was recorded"
+            f"the record must have the {len(known)} joints of the hand, but "
+            f"{' and '.join(apart)}; complete it, or give the hand that was recorded"
         )
     if len(grasp.joints) != len(known):
         raise InputError(
             f"the record must have the {len(known)} joints of the hand, got "
-            f"{len(grasp.joints)}; give the hand that was recorded"
+            f"{len(grasp.joints)}; complete it, or give the hand that was recorded"
         )
     order = [given.index(name) for name in known] if given else list(range(len(known)))
     stages = record.pregrasp, grasp, record.squeeze

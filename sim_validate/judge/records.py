@@ -47,6 +47,17 @@ def _printable(text: str) -> str:
     return text
 
 
+def _radians(angles: Array) -> Array:
+    """Refuse angles that no joint has."""
+    most = float(np.abs(angles).max(initial=0.0))
+    if most > LARGEST_POSTURE_RAD:
+        raise UnfitError(
+            f"must be radians from -{LARGEST_POSTURE_RAD:.4g} to {LARGEST_POSTURE_RAD:.4g}, got "
+            f"{most:.4g}; degrees are larger, so convert them"
+        )
+    return angles
+
+
 RecordText = Annotated[str, Len(1, LONGEST_TEXT), AfterValidator(_printable)]
 MeshScale = Annotated[float, Interval(ge=1e-6, le=1e3)]
 
@@ -59,8 +70,9 @@ class Posture(Declared):
     """Pose of the hand's root in the object's frame, (4, 4) [m]."""
     joints: Annotated[
         Array,
-        Shape("j", least=-LARGEST_POSTURE_RAD, most=LARGEST_POSTURE_RAD),
+        Shape("j"),
         Len(1, MOST_JOINTS),
+        AfterValidator(_radians),
     ]
     """Joint angles, (j,) [rad]."""
 

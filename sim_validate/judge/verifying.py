@@ -39,6 +39,8 @@ def verify(folder: Path) -> list[str]:
     faults = list[str]()
     try:
         found = Judgements.read(folder / JUDGEMENTS)
+        if found.asked is not None and not found.records:
+            faults.append(f"{JUDGEMENTS}: no record was judged, so there is nothing to check")
         faults += _faults(found)
         faults += _table_faults(folder / TABLE_FILE, found)
     except InputError as error:

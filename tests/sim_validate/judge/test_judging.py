@@ -88,7 +88,8 @@ def test_records_of_another_hand_are_told_apart_and_the_others_judged():
                     grasp=bent(record().grasp, record().grasp.joints[:5]))  # fmt: skip
     found = judged(fewer, record())
     assert found[0] == (
-        "the record must have the 16 joints of the hand, got 5; give the hand that was recorded"
+        "the record must have the 16 joints of the hand, got 5; complete it, or give the hand that "
+        "was recorded"
     )
     assert found[1].passed
 

@@ -138,9 +138,9 @@ def test_what_a_record_states_is_kept_in_the_order_of_the_hand(tmp_path):
 @pytest.mark.parametrize(
     ("joints", "names", "said"),
     [
-        ((0.0, 0.0), ("left", "thumb"), "it lacks right, and thumb of it are not the hand's"),
-        ((0.0,), ("left",), "it lacks right, and none of it are not the hand's"),
-        ((0.0,) * 3, ("left", "right", "thumb"), "it lacks none, and thumb of it are not"),
+        ((0.0, 0.0), ("left", "thumb"), "it lacks right and the hand has no thumb"),
+        ((0.0,), ("left",), "but it lacks right; complete it"),
+        ((0.0,) * 3, ("left", "right", "thumb"), "but the hand has no thumb; complete"),
         ((0.0,) * 3, (), "must have the 2 joints of the hand, got 3"),
     ],
 )

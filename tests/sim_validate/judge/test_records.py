@@ -45,7 +45,7 @@ def test_a_wrong_record_is_refused(change, said):
 
 @pytest.mark.parametrize(
     ("root", "joints", "said"),
-    [(HERE, [90.0], "joints must hold numbers from"), (HERE, [], "joints"),
+    [(HERE, [90.0], "joints must be radians from"), (HERE, [], "joints"),
      (HERE, [0.0] * 101, "joints"), (HERE, [float("nan")], "joints"), (np.eye(3), [0.0], "root"),
      (HERE + 1e-6 * np.eye(4), [0.0], "root must be a pose"),
      (np.diag([1.0, 1.0, -1.0, 1.0]), [0.0], "root must be a pose"),

@@ -95,7 +95,7 @@ def test_stages_may_be_left_out_and_other_fields_are_left_alone(tmp_path):
      ({"obj_scale": [1.0, 2.0, 1.0]}, "stretched"), ({"obj_pose": np.ones(7)}, "length 1"),
      ({"grasp_qpos": None}, "grasp must be"), ({"obj_pose": np.zeros((0, 7))}, "obj_pose"),
      ({"squeeze_qpos": np.concatenate([seven(np.eye(4)), np.zeros(4)])}, "the 3 joints"),
-     ({"pregrasp_qpos": np.concatenate([seven(np.eye(4)), [60.0] * 3])}, "joints must hold")],
+     ({"pregrasp_qpos": np.concatenate([seven(np.eye(4)), [60.0] * 3])}, "joints must be radians")],
     ids=str,
 )  # fmt: skip
 def test_a_wrong_record_of_a_list_loses_only_itself(change, said, tmp_path):
