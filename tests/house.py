@@ -12,20 +12,20 @@ from pathlib import Path
 ROOT = Path(__file__).parent.parent
 PACKAGES = ("grasp_core", "scenes", "sim_validate")
 TOTALS = {
-    "lines of packages": 65_849,
+    "lines of packages": 65_873,
     "modules of packages": 338,
-    "lines of tests": 45_625,
-    "lines of docs": 4_260,
+    "lines of tests": 45_626,
+    "lines of docs": 4_262,
 }
 """Most that there may be. Who merges lowers a number to what the command prints. A number rises
 only with a line below that says why."""
 RISES = (
-    "lines of packages, 61,173 to 65,849, modules, 304 to 338: recorded grasps are judged, in six"
+    "lines of packages, 61,173 to 65,873, modules, 304 to 338: recorded grasps are judged, in six"
     " formats, with hands as their files have them, objects of convex pieces, a trial of the whole"
     " hand, pages and checks of what is written",
-    "lines of tests, 41,548 to 45,625: a test for each of these, beside MuJoCo's own kinematics,"
+    "lines of tests, 41,548 to 45,626: a test for each of these, beside MuJoCo's own kinematics,"
     " closed forms and hostile files",
-    "lines of docs, 3,986 to 4,260: a page and a notebook about recorded grasps, and their fields",
+    "lines of docs, 3,986 to 4,262: a page and a notebook about recorded grasps, and their fields",
     "lines of packages, 60,554 to 61,173, modules, 300 to 304: gates that are kept, samples"
     " simulated in one call, maps bounded side by side, runs again in two lengths of steps,"
     " processor time by kind of work, and published tests imported where they are asked for",
