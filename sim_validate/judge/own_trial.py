@@ -329,6 +329,6 @@ class ClosedHand:
         if far < self.trials.setup.hold.hold_threshold * self.size:
             return HeldLoad(name, limit, Outcome.HELD, "", far)
         reason = f"the object moved by {MILLI * far:.3g} mm"
-        if 0.0 < limit < 1.0:
-            reason += f"; by the analysis {limit:.3g} of the load is the most that is resisted"
+        if limit > 0.0:
+            reason += f"; by the analysis {limit:.3g} times the load is resisted"
         return HeldLoad(name, limit, Outcome.SLIPPED, reason, far)
