@@ -206,10 +206,10 @@ class RecordJudgement(Declared):
     ferrari_canny: Annotated[float | None, Shown("Q", ".3f")]
     """Proved lower bound of the Ferrari-Canny quality for normal forces of sum one newton [N],
     torques over the object's radius; zero without closure."""
-    payload: float | None
+    payload: Annotated[float | None, Shown("payload", ".3f")]
     """Proved lower bound of the weight that the contacts hold in every orientation, over the sum of
     their normal forces; zero without closure."""
-    least_push_n: OrInfinity | None
+    least_push_n: Annotated[OrInfinity | None, Shown("least push N", ".3g")]
     """Least sum of normal forces that holds the weight of the settings in every orientation, by
     that bound [N]; infinite without closure."""
     weakest_n: Annotated[float | None, Shown("weakest N", ".3g")]
