@@ -12,7 +12,7 @@ from pathlib import Path
 ROOT = Path(__file__).parent.parent
 PACKAGES = ("grasp_core", "scenes", "sim_validate")
 TOTALS = {
-    "lines of packages": 65_873,
+    "lines of packages": 65_865,
     "modules of packages": 338,
     "lines of tests": 45_626,
     "lines of docs": 4_262,
@@ -20,7 +20,7 @@ TOTALS = {
 """Most that there may be. Who merges lowers a number to what the command prints. A number rises
 only with a line below that says why."""
 RISES = (
-    "lines of packages, 61,173 to 65,873, modules, 304 to 338: recorded grasps are judged, in six"
+    "lines of packages, 61,173 to 65,865, modules, 304 to 338: recorded grasps are judged, in six"
     " formats, with hands as their files have them, objects of convex pieces, a trial of the whole"
     " hand, pages and checks of what is written",
     "lines of tests, 41,548 to 45,626: a test for each of these, beside MuJoCo's own kinematics,"

@@ -13,20 +13,19 @@ levers, limits and servos of the whole way are checked.
 """
 
 import math
-from dataclasses import dataclass, replace
-from typing import Self
+from dataclasses import dataclass
 
 import numpy as np
 
 from scenes.hand_files.model import compiled_hand
 from scenes.mujoco.hand_texts import text_of_hand
 from scenes.mujoco.published_tests import HandServos, TestedObject
-from sim_validate.engine.known_cases import GateCheck, two_digits
-from sim_validate.engine.setup import Setup
+from sim_validate.engine.known_cases import GateCheck
 from sim_validate.hands.known_hand import (
     CUBE_HALF,
     HINGE_HEIGHT,
     KNOWN_TORQUE,
+    KnownHand,
     cube,
     hinged_hand,
 )
@@ -34,6 +33,7 @@ from sim_validate.judge.own_trial import GENTLE, ClosedHand, HandTrials
 from sim_validate.judge.postures import Placed
 
 OPENED_RAD = 0.06
+"""Angle by which the hinges are open before the hand closes: 5 mm at the fingertips."""
 PREDICTED, SIMULATED = (0.995, 1.005), (0.985, 1.015)
 """Intervals of limits by the analysis, and in simulation, over the exact ones: contacts of a hand
 that has closed are some micrometres off."""
@@ -42,16 +42,8 @@ SPAN = 0.05
 
 
 @dataclass(frozen=True, slots=True)
-class KnownGrasp:
-    """The settings and the friction with which the simulator is checked on a recorded grasp."""
-
-    setup: Setup
-    friction: float
-
-    @classmethod
-    def of(cls, setup: Setup, friction: float) -> Self:
-        """Return the case for trials with some settings."""
-        return cls(replace(setup, threads=1, timeout_s=math.inf), two_digits(friction))
+class KnownGrasp(KnownHand):
+    """The known hand as a recorded grasp: from the text of a file, closing on the cube."""
 
     def checks(self) -> tuple[GateCheck, ...]:
         """Measure what the hand resists, over the exact figures."""

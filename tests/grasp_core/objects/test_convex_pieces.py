@@ -207,13 +207,13 @@ NESTED = [((0, 0, 0), (3, 3, 3)), ((1, 1, 1), (2, 2, 2))]
 
 
 def merged(mesh):
-    """The same mesh, whose parts share vertices where they touch."""
+    """Parts share vertices where they touch in the mesh that this returns."""
     points, order = np.unique(mesh.vertices, axis=0, return_inverse=True)
     return Mesh(points, order.ravel()[mesh.triangles])
 
 
 def loose(mesh):
-    """The same mesh, each triangle with vertices of its own, as in an STL file."""
+    """Each triangle has vertices of its own in the mesh that this returns, as in an STL file."""
     return Mesh(mesh.corners.reshape(-1, 3), np.arange(mesh.triangles.size).reshape(-1, 3))
 
 

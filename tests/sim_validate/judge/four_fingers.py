@@ -18,7 +18,7 @@ HAND = "".join(FINGER.format(turn=90 * k, k=k) for k in range(4))
 CLOSED = (0.0, 0.0, 0.0, 0.0)
 """Joint angles with the fingertips on the middles of the cube's four upright sides [rad]."""
 TWO_OPEN = (0.0, 0.3, 0.0, 0.3)
-"""The same with two opposite fingers away from the cube."""
+"""Joint angles with two opposite fingers away from the cube [rad]."""
 
 
 def write_hand(folder):
