@@ -1,10 +1,11 @@
 """What rooms share: plans that are made once, and commands that are run here or only read."""
 
 import json
+from itertools import count
 
 import pytest
 
-from grasp_core.time_spent import in_words
+from grasp_core.time_spent import TIME_SPENT, in_words
 from sim_validate.commands.exit_codes import Exit
 from sim_validate.main import main
 from tests.sim_validate.datasets import engines
@@ -46,8 +47,10 @@ def asked(monkeypatch):
 
 @pytest.fixture
 def spent(monkeypatch):
-    """The seconds of each kind of work that a command tells, before they are rounded."""
+    """The seconds of each kind of work that a command tells, by a clock that each look moves on."""
     found = {}
+    monkeypatch.setattr(TIME_SPENT, "_counted", 0.0)
+    monkeypatch.setattr(TIME_SPENT, "_clock", count(1.0).__next__)
     monkeypatch.setattr(
         "sim_validate.main.in_words", lambda each: found.update(each) or in_words(each)
     )
