@@ -15,7 +15,7 @@ from grasp_core.by_value import counted
 from grasp_core.figures import NONE, meanings, table
 from grasp_core.files.file_kinds import GRASPS, REACHES
 from grasp_core.files.records import RecordFile, record_of
-from grasp_core.hands.hand import Coupling, Hand, load_hand
+from grasp_core.hands.hand import Hand, load_hand
 from grasp_core.hands.reach import HandReach
 from grasp_core.messages import MILLI
 from grasp_core.names import HANDS
@@ -227,7 +227,9 @@ def show_hand(command: hand_flags.ShownHand, reporter: Reporter) -> int:
         listed = ", ".join(" and ".join(pair) for pair in hand.ignored_pairs)
         reporter.say(f"Links that may overlap, besides neighbours: {listed}.")
     if hand.couplings:
-        reporter.say(f"Joints that follow others: {', '.join(map(_follows, hand.couplings))}.")
+        reporter.say(
+            f"Joints that follow others: {', '.join(each.equation for each in hand.couplings)}."
+        )
     reporter.say(f"Torque limits: {hand.torque_source}.")
     reporter.say(_weight(hand))
     if all(joint.highest - joint.lowest < SMALL_RANGE for joint in hand.joints):
@@ -249,9 +251,3 @@ def _weight(hand: Hand) -> str:
         return "Masses of links: unknown; without them gravity does not load the motors."
     said = f"The links of the fingers weigh {1e3 * sum(stated):.3g} g together"
     return said + ("." if hand.name in HANDS else f"; {SHAPES_WEIGH}.")
-
-
-def _follows(coupling: Coupling) -> str:
-    said = f"{coupling.joint} = {coupling.ratio:g} {coupling.driver}"
-    offset = math.degrees(coupling.offset)
-    return f"{said} {'-' if offset < 0.0 else '+'} {abs(offset):.4g} deg" if offset else said

@@ -3,7 +3,7 @@
 import sim_validate as sv
 from scenes.example_objects import example_object
 from sim_validate.datasets.build import build
-from sim_validate.datasets.config import DatasetConfig, Learning
+from sim_validate.datasets.config import DatasetConfig, DatasetHand, Learning
 from sim_validate.datasets.open_dataset import select
 from sim_validate.datasets.parquet import read_table
 from tests.sim_validate.datasets.engines import Here, silent
@@ -25,8 +25,9 @@ LEARNED = DatasetConfig(
     ),
     learning=Learning(
         friction_below=1, friction_near=1, friction_above=1, moved_out=1, mass_near=1, synthetic=1,
-        figures=("closure", "least_squeeze", "placement"), seeds=(7,), hand="leap",
+        figures=("closure", "least_squeeze", "placement"), seeds=(7,),
     ),
+    hand=DatasetHand(hand="leap"),
 )  # fmt: skip
 """Two objects with rows of every kind."""
 BODIES = {body.content_sha256: body for body in map(example_object, LEARNED.objects)}
