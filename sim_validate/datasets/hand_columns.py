@@ -21,6 +21,7 @@ from scenes.mujoco.hand_scenes import strong_motors
 from sim_validate.datasets.config import HAND
 from sim_validate.datasets.parquet import Known, RowCells, Within
 from sim_validate.execution.verdict import ExecutedGrasp
+from sim_validate.hands.execute import can_execute
 from sim_validate.hands.reaches import ReachedGrasp
 from sim_validate.hands.verdict import HandVerdict
 
@@ -75,8 +76,8 @@ class HandCells(Declared):
     executed: Annotated[bool | None, Field(alias="hand_executed")] = None
     """Whether the hand executed the grasp in simulation; null where it was not asked to."""
     survived: Annotated[bool | None, Field(alias="hand_survived")] = None
-    """Whether the object survived every trial with the hand; false also where there is no execution
-    for the reason in `hand_note`."""
+    """Whether the object survived every trial with the hand; false also where no squeeze within its
+    torques carries the weight; null where it is not known."""
     mass_kg: Annotated[Known, Field(alias="hand_mass_kg"), Within(HAND_ROUNDING)] = None
     """Mass of the object in the execution with the hand."""
     squeeze_n: Annotated[AtContacts | None, Field(alias="hand_squeeze_n")] = None
@@ -178,11 +179,12 @@ def _trial_cells(held: HandVerdict) -> RowCells:
 
 def _execution_cells(hand: Hand, reach: HandReach, executed: ExecutedGrasp) -> RowCells:
     found = executed.execution
-    about = {"executed": found is not None, "survived": executed.survived}
     if found is None:
-        return {**about, "note": executed.reason}
+        lost = {"survived": False} if can_execute(hand, reach) else {}
+        return {"executed": False, **lost, "note": executed.reason}
     return {
-        **about,
+        "executed": True,
+        "survived": executed.survived if found.trials else None,
         "mass_kg": found.mass_kg,
         "squeeze_n": _at_contacts(reach, found.squeeze),
         "motor_share": motor_share(hand, reach, found.squeeze),

@@ -11,7 +11,7 @@ from functools import partial
 
 from grasp_core.allowed_values import instance
 from grasp_core.errors import InputError, NoForcesError
-from grasp_core.execution.grips import Grip, unsqueezed
+from grasp_core.execution.grips import STIFFNESS_N_PER_M, Grip, unsqueezed
 from grasp_core.execution.squeeze_certificate import BestSqueeze
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_motors import hand_grip
@@ -110,6 +110,15 @@ class HandHolder(Holder):
         """Build the scene in which a squeeze is executed."""
         near = self.reach_m(settings, best.grip)
         return held_hand_scene(self.hand, self.body, self.reach, best.grip, settings, near)
+
+
+def can_execute(hand: Hand, reach: HandReach) -> bool:
+    """Return whether motors carry the links, and fingertips can move in all directions."""
+    try:
+        finger_springs(strong_motors(hand, reach), STIFFNESS_N_PER_M)
+    except InputError:
+        return False
+    return True
 
 
 def executed_by_hand(
