@@ -40,15 +40,14 @@ class HandFiles:
         kept = sorted((dataset / HAND_FOLDER).glob(f"*/{HAND_RECORD}"))
         if asked.hand not in HANDS and kept and not Path(asked.hand).exists():
             return cls.kept(kept[0].parent)
-        files = dict[str, bytes]()
+        hand, files = asked_hand(asked, asked.hand), dict[str, bytes]()
         if asked.hand not in HANDS:
             path = Path(asked.hand)
             read = model_text(path)
             # meshes without content could not be read, and cannot be from the copy
             files |= {name: data for name, data in read.files.items() if name not in read.unread}
             files[path.name] = read.xml.encode()
-        hand = text_of(record_of(asked_hand(asked, asked.hand)))
-        return cls({**files, HAND_RECORD: hand.encode()})
+        return cls({**files, HAND_RECORD: text_of(record_of(hand)).encode()})
 
     @classmethod
     def kept(cls, folder: Path) -> Self:
@@ -97,18 +96,16 @@ def joint_names(folder: Path | None) -> tuple[str, ...]:
     return () if folder is None else tuple(joint.name for joint in kept_hand(folder).joints)
 
 
-def kept_faults(asked: DatasetHand, folder: Path) -> list[str]:
-    """Say how what a dataset keeps of its hand is not what its files describe.
+def kept_fault(asked: DatasetHand, folder: Path) -> str:
+    """Say how the hand that a dataset keeps is not the one that its files describe; empty if it is.
 
-    Numbers are those of the machine that read the file, so that this is for one that rounds alike.
+    Numbers are those of the machine that read the file, so this is for one that rounds alike.
     """
     where = f"{HAND_FOLDER}/{folder.name}"
     try:
-        if HandFiles.kept(folder).sha256 != folder.name:
-            return [f"{where}: the files are others than the name of their folder says"]
         again = asked_hand(asked, folder / Path(asked.hand).name)
     except InputError as error:
-        return [f"{where}: the hand cannot be read again ({error})"]
+        return f"{where}: the hand cannot be read again ({error})"
     # notes also tell what the text that is kept no longer has
-    parts = (record_of(each) | {"notes": None} for each in (kept_hand(folder), again))
-    return [] if next(parts) == next(parts) else [f"{where}: {HAND_RECORD} is another hand"]
+    one, other = (record_of(each) | {"notes": None} for each in (kept_hand(folder), again))
+    return "" if one == other else f"{where}: {HAND_RECORD} is another hand"

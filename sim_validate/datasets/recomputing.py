@@ -18,7 +18,7 @@ from grasp_core.provenance import arithmetic
 from sim_validate.datasets.columns import ROUNDOFF, DatasetRows, GraspRow, ObjectRow
 from sim_validate.datasets.config import KEYS, TableName
 from sim_validate.datasets.given_grasps import read_given
-from sim_validate.datasets.hand_files import kept_faults
+from sim_validate.datasets.hand_files import kept_fault
 from sim_validate.datasets.layout import GIVEN_CONTACTS
 from sim_validate.datasets.making_rows import compute_rows
 from sim_validate.datasets.open_dataset import Dataset
@@ -46,12 +46,12 @@ class Recomputing:
                 gone = self._quarantined.setdefault((each.source_sha256, each.friction), set())
                 gone.update(each.given)
 
-    def hand_faults(self) -> list[str]:
+    def hand_fault(self) -> str:
         """Say how the hand is not the one that its files describe, where numbers round alike."""
         asked, folder = self._config.hand, self._dataset.hand_folder
         if asked is None or folder is None or not self._exact:
-            return []
-        return kept_faults(asked, folder)
+            return ""
+        return kept_fault(asked, folder)
 
     def frictions(self, row: ObjectRow) -> list[float]:
         """List the frictions at which an object has rows, perhaps without a grasp."""
