@@ -32,7 +32,7 @@ from sim_validate.datasets.columns import ROUNDOFF, VARIED, GraspRow
 from sim_validate.datasets.config import DatasetHand
 from sim_validate.datasets.hand_columns import HandCells, motor_share
 from sim_validate.datasets.layout import CONFIG
-from sim_validate.datasets.row_faults import disagreements
+from sim_validate.datasets.parquet import disagreements
 from sim_validate.hands.execute import HandHolder
 from sim_validate.hands.reached_grasps import carried, execution_with
 

@@ -6,6 +6,7 @@ the names of units of work: rows about one hand are never taken for those about 
 """
 
 import hashlib
+import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -22,6 +23,7 @@ from scenes.hand_files.building import hand_from_file
 from scenes.hand_files.model_text import model_text
 from sim_validate.datasets.config import DatasetHand
 from sim_validate.datasets.layout import HAND_FOLDER, HAND_RECORD
+from sim_validate.datasets.manifest import require_inside
 from sim_validate.files.output_folders import whole_folder
 from sim_validate.hands.reached_grasps import with_motors
 
@@ -43,6 +45,7 @@ class HandFiles:
         hand, files = asked_hand(asked, asked.hand), dict[str, bytes]()
         if asked.hand not in HANDS:
             path = Path(asked.hand)
+            require_inside(path.name, "hand")
             read = model_text(path)
             # meshes without content could not be read, and cannot be from the copy
             files |= {name: data for name, data in read.files.items() if name not in read.unread}
@@ -68,10 +71,11 @@ class HandFiles:
         return dataset.resolve() / HAND_FOLDER / self.sha256
 
     def keep(self, dataset: Path) -> None:
-        """Write the files into the folder of a dataset, all or none."""
+        """Write the files into the folder of a dataset, all or none, and remove other hands."""
         folder = self.folder(dataset)
-        if folder.is_dir():
+        if folder.is_dir() and self.kept(folder).sha256 == folder.name:
             return
+        shutil.rmtree(folder.parent, ignore_errors=True)
         with whole_folder(folder) as made:
             for name, data in self.files.items():
                 (made / name).write_bytes(data)

@@ -1,6 +1,6 @@
 """Has the hand of a dataset look for a pose in a grasp, and do there what the settings ask."""
 
-from grasp_core.errors import UnfaithfulError
+from grasp_core.errors import InputError, UnfaithfulError
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.settings import ReachSettings
 from grasp_core.objects.polyhedron import Polyhedron
@@ -19,12 +19,16 @@ def hand_cells(
 
     Where a simulation is refused, the pose is there all the same, with the reason as a note.
     """
-    pose, note = ReachSettings(seed=config.seed), ""
-    if simulated and config.hand is not None:
+    pose, note, execution = ReachSettings(seed=config.seed), "", None
+    asked = config.hand if simulated else None
+    if asked is not None:
         try:
-            execution = execution_with(config.hand, body)
-            task = HandTask(pose, config.hand.simulate, execution, enough=False)
-            return HandCells.of(hand, reached_grasp(hand, body, grasp, friction, task))
+            execution = execution_with(asked, body)
+        except InputError as error:  # an open surface has no mass by its density
+            note = str(error)
+        try:
+            task = HandTask(pose, asked.simulate, execution, enough=False)
+            return HandCells.of(hand, reached_grasp(hand, body, grasp, friction, task), note)
         except (*OWN_FAULTS, UnfaithfulError) as error:
             note = str(error)
     found = reached_grasp(hand, body, grasp, friction, HandTask(pose))

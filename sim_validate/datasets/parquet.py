@@ -179,6 +179,15 @@ def agrees(kind: type, name: str, stated: Any, value: Any) -> bool:
     return np.allclose(stated, value, rtol=within.relative, atol=within.absolute)
 
 
+def disagreements(row: object, wanted: Mapping[str, Any], source: str) -> Iterator[str]:
+    """Yield cells of a row that something else says otherwise, beyond what their kinds allow."""
+    columns = {each.name: each.key for each in entries(type(row))}
+    for name, value in wanted.items():
+        stated = getattr(row, name)
+        if not agrees(type(row), name, stated, value):
+            yield f"{columns[name]} is {stated}, but {value} by {source}"
+
+
 Columns: TypeAlias = dict[str, NDArray[Any]]
 TYPES: Mapping[CellKind, str] = {
     "text": "string",

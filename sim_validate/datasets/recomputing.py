@@ -22,9 +22,8 @@ from sim_validate.datasets.hand_files import kept_fault
 from sim_validate.datasets.layout import GIVEN_CONTACTS
 from sim_validate.datasets.making_rows import compute_rows
 from sim_validate.datasets.open_dataset import Dataset
-from sim_validate.datasets.parquet import RowCells
+from sim_validate.datasets.parquet import RowCells, disagreements
 from sim_validate.datasets.quarantine import TWIN, read_quarantine
-from sim_validate.datasets.row_faults import disagreements
 from sim_validate.datasets.work_units import WorkUnit, provenance
 from sim_validate.execution.verdict import may_slip
 

@@ -42,7 +42,7 @@ from sim_validate.datasets.learning import (
 )
 from sim_validate.datasets.making_rows import PLANNED_KIND
 from sim_validate.datasets.open_dataset import Dataset
-from sim_validate.datasets.row_faults import disagreements
+from sim_validate.datasets.parquet import disagreements
 from sim_validate.engine.held_or_let_go import Outcome
 from sim_validate.execution.holders import tip_radius
 from sim_validate.execution.verdict import ExecutionTrial

@@ -311,6 +311,35 @@ def test_another_hand_makes_other_units_and_is_refused_in_a_finished_dataset(tmp
     assert one == {unit.id for unit in units_of(config, Path("elsewhere") / "first")}
 
 
+def test_only_one_hand_is_kept_and_a_damaged_one_is_written_anew(gripping, tmp_path):
+    hand = HandFiles.of(gripping.hand, tmp_path)
+    other = HandFiles({**hand.files, "three_fingers.xml": b"another"})
+    other.keep(tmp_path)
+    hand.keep(tmp_path)
+    assert [*(tmp_path / HAND_FOLDER).iterdir()] == [hand.folder(tmp_path)]
+    (hand.folder(tmp_path) / "pad.stl").write_bytes(b"")
+    hand.keep(tmp_path)
+    assert HandFiles.kept(hand.folder(tmp_path)).files == hand.files
+
+
+def test_an_object_whose_mass_is_not_known_is_held_and_not_executed(
+    monkeypatch, gripping, tmp_path
+):
+    """An open surface has no mass by its density."""
+
+    def massless(*_):
+        raise gc.InputError("give mass_kg")
+
+    monkeypatch.setattr(hand_work, "execution_with", massless)
+    config = replace(gripping, objects=("tetrahedron",), learning=None)
+    build(config, tmp_path / "ds", Here(), silent)
+    (row,) = [row for row in rows_of(tmp_path / "ds", "grasps") if row["hand_reached"]]
+    assert row["hand_held"]
+    assert row["hand_executed"] is None
+    assert row["hand_note"] == "give mass_kg"
+    assert verify(tmp_path / "ds") == []
+
+
 def test_a_simulation_that_is_refused_leaves_the_pose(monkeypatch, gripping, tmp_path):
     plain = hand_work.reached_grasp
 
