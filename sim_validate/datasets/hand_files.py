@@ -55,7 +55,7 @@ class HandFiles:
     @classmethod
     def kept(cls, folder: Path) -> Self:
         """Read the files that a dataset keeps of its hand."""
-        return cls({path.name: path.read_bytes() for path in folder.iterdir()})
+        return cls({path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()})
 
     @property
     def sha256(self) -> str:

@@ -20,7 +20,14 @@ from sim_validate.datasets.columns import dataset_tables
 from sim_validate.datasets.config import SPLITS, DatasetConfig
 from sim_validate.datasets.given_grasps import given_text
 from sim_validate.datasets.hand_files import joint_names, kept_hand
-from sim_validate.datasets.layout import CARD, CONFIG, DATA, FILE_FOLDERS, GIVEN_CONTACTS
+from sim_validate.datasets.layout import (
+    CARD,
+    CONFIG,
+    DATA,
+    FILE_FOLDERS,
+    GIVEN_CONTACTS,
+    HAND_FOLDER,
+)
 from sim_validate.datasets.manifest import Listed, Manifest, listed, write_manifest
 from sim_validate.datasets.parquet import Tables, joined, write_files
 from sim_validate.datasets.quarantine import TWIN, QuarantinedUnit, quarantine_text
@@ -49,7 +56,7 @@ def write_rows(
         write_text(folder / QUARANTINE, quarantine_text(quarantined)),
         *_write_given(folder, units),
         *(path for name in FILE_FOLDERS for path in sorted((folder / name).glob("*"))),
-        *([] if hand is None else sorted(hand.iterdir())),
+        *sorted((folder / HAND_FOLDER).glob("*/*")),
     ]
     return Manifest(
         config_sha256=config.sha256,

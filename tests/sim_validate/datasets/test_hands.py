@@ -154,6 +154,7 @@ def test_a_dataset_without_a_hand_has_none(small_dataset):
 
 def test_the_hand_is_kept_as_its_file_and_as_it_was_read(handed, gripping):
     (folder,) = (handed / HAND_FOLDER).iterdir()
+    assert HandFiles.kept(folder).sha256 == folder.name
     names = {path.name for path in folder.iterdir()}
     assert names == {"three_fingers.xml", "pad.stl", HAND_RECORD}
     listed = {each.path for each in select(handed).manifest.files}
@@ -259,11 +260,14 @@ def test_another_hand_in_the_place_of_the_kept_one_is_named(copied, name, old, n
     assert kept_fault(asked, moved).endswith("hand.json is another hand")
 
 
-def test_the_same_hand_elsewhere_gives_the_same_bytes_on_two_processes(handed, tmp_path):
+def test_the_same_hand_elsewhere_gives_the_same_bytes_on_two_processes(
+    handed, tmp_path, monkeypatch
+):
     """All but where the file was, as it was given: the settings and the card tell that."""
     config = with_gripper(tmp_path)
+    monkeypatch.chdir(tmp_path)
     with local_processes(2) as engine:
-        build(config, tmp_path / "ds", engine, silent, HANGING_S)
+        build(config, Path("ds"), engine, silent, HANGING_S)
     telling = {"config.toml", "README.md", "manifest.json"}
     one, other = (contents(folder) for folder in (handed, tmp_path / "ds"))
     assert one.keys() == other.keys()
