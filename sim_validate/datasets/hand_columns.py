@@ -21,7 +21,6 @@ from scenes.mujoco.hand_scenes import strong_motors
 from sim_validate.datasets.config import HAND
 from sim_validate.datasets.parquet import Known, RowCells, Within
 from sim_validate.execution.verdict import ExecutedGrasp
-from sim_validate.hands.execute import can_execute
 from sim_validate.hands.reaches import ReachedGrasp
 from sim_validate.hands.verdict import HandVerdict
 
@@ -76,8 +75,8 @@ class HandCells(Declared):
     executed: Annotated[bool | None, Field(alias="hand_executed")] = None
     """Whether the hand executed the grasp in simulation; null where it was not asked to."""
     survived: Annotated[bool | None, Field(alias="hand_survived")] = None
-    """Whether the object survived every trial with the hand; false also where no squeeze within its
-    torques carries the weight; null where it is not known."""
+    """Whether the object survived every trial with the hand; false also where its motors carry
+    the links or the weight in no way, as `hand_note` says; null where it is not known."""
     mass_kg: Annotated[Known, Field(alias="hand_mass_kg"), Within(HAND_ROUNDING)] = None
     """Mass of the object in the execution with the hand."""
     squeeze_n: Annotated[AtContacts | None, Field(alias="hand_squeeze_n")] = None
@@ -180,8 +179,7 @@ def _trial_cells(held: HandVerdict) -> RowCells:
 def _execution_cells(hand: Hand, reach: HandReach, executed: ExecutedGrasp) -> RowCells:
     found = executed.execution
     if found is None:
-        lost = {"survived": False} if can_execute(hand, reach) else {}
-        return {"executed": False, **lost, "note": executed.reason}
+        return {"executed": False, "survived": False, "note": executed.reason}
     return {
         "executed": True,
         "survived": executed.survived if found.trials else None,

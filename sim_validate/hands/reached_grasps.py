@@ -12,7 +12,7 @@ from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.errors import InputError, SolverError
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_motors import hand_payload
-from grasp_core.hands.reach import HandReach, reach_with, uncoupled
+from grasp_core.hands.reach import HandReach, reach_with
 from grasp_core.hands.settings import ReachSettings
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Grasp
@@ -86,7 +86,6 @@ def with_motors(hand: Hand, trials: HandTrials, source: str, *, flags: bool) -> 
         hand = hand.with_torque_limits(trials.torque_limit_n_m, source)
     if trials.needs_motors:
         asked = called(trials.needs_motors)
-        uncoupled(hand, asked)
         missing = [joint.name for joint in hand.free_joints if joint.torque_limit_n_m is None]
         if missing:
             raise InputError(
