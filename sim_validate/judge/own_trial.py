@@ -61,6 +61,8 @@ STRONG_N_M = 1e3
 """Torque limit of a motor where none is known [N m]: no limit matters."""
 GENTLE = 0.6
 """Largest normal force without a load, over the largest there is."""
+LEAST_SQUEEZE = 1e-3
+"""Largest force without a load, over the largest there is, with which a hand does not squeeze."""
 LESS_FRICTION, LEAST_FRICTION = 0.8, 1e-3
 """Friction of the control with less friction, over what its contacts need, and its least value."""
 FEWEST_CONTACTS = 2
@@ -120,6 +122,11 @@ class HandTrials:
             return lost.because(f"{len(held.contacts)} contacts are left when the hand has closed")
         try:
             proof = force_closure(held.contacts, friction=self.friction)
+            if proof.closed and held.is_limp:
+                return lost.because(
+                    "no forces of the closed hand balance each other: some of its joints are "
+                    "pulled by one motor together"
+                )
             return held.open_trial(proof, far) if not proof.closed else held.trial(proof, far)
         except UNDECIDED as error:
             return lost.because(f"when the hand has closed, {error}")
@@ -190,6 +197,12 @@ class ClosedHand:
     def is_balanced(self) -> bool:
         """Whether contact forces must balance joints that one motor pulls."""
         return len(self.motors.limits) > len(self.trials.hand.servos.names)
+
+    @property
+    def is_limp(self) -> bool:
+        """Whether motors that pull several joints can hardly squeeze the object at all."""
+        largest = float(np.linalg.norm(self.idle, axis=1).max(initial=0.0))
+        return self.is_balanced and largest < LEAST_SQUEEZE * self.trials.push_n
 
     def _resting(self) -> Array:
         """Return forces without a load that motors can exert: means of those at limits, (k, 3) [N].
