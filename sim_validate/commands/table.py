@@ -42,8 +42,8 @@ COMMANDS: Mapping[str, Command] = {
         "held under gravity, as in the command `execute`.",
     ),
     "export": Command(
-        "commands.simulation_flags:ExportFlags", "execution.command:export_grasps",
-        "Write grasps as a scene for viewers and editors of 3D scenes.",
+        "commands.simulation_flags:ExportFlags", "report.command:export_grasps",
+        "Write grasps for other programs: as a 3D scene, or a hand in them for Isaac.",
     ),
     "view": Command(
         "commands.flags:ViewFlags", "report.command:view_grasp",
@@ -143,6 +143,7 @@ scene plan/grasps.json --out scenes
 scene plan/grasps.json --grasp c-0-1-2-7
 scene plan/grasps.json --mass-kg 0.3 --out held
 export plan/grasps.json -o grasps.glb
+export reached/grasps.json --to isaac -o grasps.yaml
 regions plan/grasps.json --out plan
 regions plan/grasps.json --reserve 0.1 --recenter --limit 5 --out smaller
 replay graspproof-out/wedge --grasp c-0-1-2-7 --out replay
