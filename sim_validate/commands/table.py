@@ -95,6 +95,10 @@ COMMANDS: Mapping[str, Command] = {
         "Check files and rows of a dataset, prove force closure again, and redo a sample; or check "
         "the judgements of records.",
     ),
+    "dataset export": Command(
+        "datasets.flags:ExportFlags", "datasets.command:export_dataset",
+        "Write the poses of a dataset's hand for Isaac, a file for each object.",
+    ),
     "baseline record": Command(
         "baselines.flags:RecordFlags", "baselines.command:record_baseline",
         "Simulate grasps and write a baseline: a file that records how stable each grasp is.",
@@ -121,7 +125,7 @@ COMMANDS: Mapping[str, Command] = {
     ),
 }  # fmt: skip
 GROUPS: Mapping[str, str] = {
-    "dataset": "Build a dataset of grasps of many objects; check datasets.",
+    "dataset": "Build a dataset of grasps of many objects; check or export datasets.",
     "baseline": (
         "Record simulation results of grasps, and notice later when their stability changes."
     ),
@@ -177,6 +181,7 @@ dataset build ds/config.toml --out again
 dataset import contacts.json mug.obj --out judged
 dataset verify ds
 dataset verify judged
+dataset export ds --out isaac
 baseline record grasps.json -o wedge.baseline.json
 baseline check wedge.baseline.json --strict
 """.splitlines()

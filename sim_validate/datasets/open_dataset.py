@@ -22,6 +22,7 @@ from grasp_core.allowed_values import one_of, path_of
 from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import object_of
 from grasp_core.files.records import Record, from_record, record_of
+from grasp_core.hands.hand import Hand, load_hand
 from grasp_core.mesh_files.limits import MeshChoices
 from grasp_core.mesh_files.reading import FileSurface, read_triangles
 from grasp_core.objects.build import DEFAULT_LIMITS, content_hash
@@ -56,6 +57,12 @@ class Dataset:
     def config(self) -> DatasetConfig:
         """Read the configuration of the dataset."""
         return config_from_toml(self.folder / CONFIG)
+
+    @cached_property
+    def hand(self) -> Hand | None:
+        """The hand whose poses the rows of grasps have; None if they have none."""
+        name = self.config.asked.hand
+        return load_hand(name) if name else None
 
     def paths(self, name: TableName) -> list[Path]:
         """List the files of a table, each checked to have the manifest's hash.
