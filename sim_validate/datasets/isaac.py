@@ -32,8 +32,9 @@ def export(
 ) -> Counter[str]:
     """Write the poses of a dataset's hand, or of one split; equal datasets give equal bytes.
 
-    Takes `report` (objects written, all objects). Returns the numbers of `objects` with a file, of
-    `grasps` in the files, and of grasps in which the hand `never_opens`, so that none has them.
+    Takes `report` (objects written, all objects). Returns the numbers of objects with a file
+    (`objects`), of grasps in the files (`grasps`), and of grasps that are left out because the hand
+    cannot open its fingers there (`never_opens`).
     """
     chosen = select(folder, split)
     hand = chosen.hand
