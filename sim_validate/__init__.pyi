@@ -7,6 +7,7 @@ from sim_validate.closure.verdict import Verdict as Verdict
 from sim_validate.closure.verdict import Verdicts as Verdicts
 from sim_validate.closure.verdict import load_verdicts as load_verdicts
 from sim_validate.datasets.open_dataset import load_dataset as load_dataset
+from sim_validate.datasets.open_dataset import load_dataset_hand as load_dataset_hand
 from sim_validate.engine.held_or_let_go import Outcome as Outcome
 from sim_validate.engine.setup import Agenda as Agenda
 from sim_validate.engine.setup import NamedWrench as NamedWrench

@@ -20,6 +20,7 @@ from grasp_core.allowed_values import (
     Reserve,
     Seed,
     Share,
+    TorqueLimit,
 )
 from grasp_core.declared import declared
 from grasp_core.errors import InputError
@@ -288,6 +289,38 @@ class ExecutionSettings(ChosenExecution):
     def most_rad(self) -> float:
         """Turn up to which an object counts as held [rad]."""
         return math.radians(self.max_deg)
+
+
+@declared
+class HandTrials(Settings):
+    """What a hand does in simulation in each grasp that it reaches, and how strong its motors are.
+
+    Raises:
+        InputError: A mass and a density are given.
+    """
+
+    torque_limit_n_m: TorqueLimit | None = None
+    """Torque limit of every joint [N m], instead of those of the hand."""
+    simulate: bool = False
+    """Hold test wrenches in simulation with the hand's links and motors, and try negative controls;
+    every joint needs a torque limit."""
+    mass_kg: Quantity | None = None
+    """Mass of the object [kg], with which the hand also executes each grasp that it reaches, as
+    `execute` does with fingertips on springs; every joint needs a torque limit."""
+    density_kg_m3: Quantity | None = None
+    """Density of the object [kg/m^3], with which the hand executes grasps, in place of a mass."""
+
+    def _check_together(self) -> None:
+        if self.mass_kg is not None and self.density_kg_m3 is not None:
+            raise InputError("mass_kg and density_kg_m3 exclude each other: leave one of them out")
+
+    @property
+    def needs_motors(self) -> str:
+        """Name of a setting for which motors must have torque limits; empty if there is none."""
+        executing = "mass_kg" if self.density_kg_m3 is None else "density_kg_m3"
+        if self.simulate:
+            return "simulate"
+        return executing if getattr(self, executing) is not None else ""
 
 
 @declared

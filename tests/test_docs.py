@@ -18,7 +18,7 @@ import scenes
 from grasp_core import errors
 from sim_validate import main as commands
 from sim_validate.commands.exit_codes import Exit
-from sim_validate.datasets.config import DatasetConfig, Learning, config_from_toml
+from sim_validate.datasets.config import DatasetConfig, DatasetHand, Learning, config_from_toml
 from sim_validate.datasets.given_grasps import read_given
 from sim_validate.engine.held_or_let_go import Outcome
 from sim_validate.engine.setup import Setup, setup_from_file, wrenches_from_file
@@ -213,11 +213,15 @@ def test_pages_list_every_exit_code_error_and_outcome():
 
 
 def test_the_settings_of_a_dataset_are_all_shown_and_its_contacts_are_read(tmp_path):
-    text, more = blocks(DATASETS, "toml")
+    text, more, with_hand = blocks(DATASETS, "toml")
     path = tmp_path / "grasps.toml"
     path.write_text(more)
     assert config_from_toml(path).learning is not None
     assert set(Learning.__dataclass_fields__) == set(tomllib.loads(more)["learning"])
+    path.write_text(with_hand)
+    assert config_from_toml(path).hand is not None
+    known = set(DatasetHand.__dataclass_fields__) - {"density_kg_m3"}  # in place of the mass
+    assert set(tomllib.loads(with_hand)["hand"]) == known
     path.write_text(text)
     config = config_from_toml(path)
     shown = set(tomllib.loads(text))
@@ -225,7 +229,7 @@ def test_the_settings_of_a_dataset_are_all_shown_and_its_contacts_are_read(tmp_p
     assert config.execution.mass_kg == 0.3
     plain = DatasetConfig(objects=config.objects)
     told = {"objects", "frictions", "title", "license", "creator", "url", "published", "execution"}
-    told |= {"unit"}  # none is given, if not
+    told |= {"unit", "hand"}  # none is given, if not
     for name in shown - told:
         assert getattr(config, name) == getattr(plain, name)
     (given,) = blocks(DATASETS, "json")

@@ -56,6 +56,8 @@ from grasp_core.quality.motors import Motors, motors_for
 
 PROOF_SLACK = 1e-9
 """Slack of pushes, of torques and of the upper bound, relative to them."""
+FILED_SLACK = 1e-6
+"""Slack of pushes and torques of a squeeze that is read from a file, relative to their limits."""
 FIRST_ANGLES = 8
 """Tangent directions of each case in the first program."""
 BOUNDING = 1e-6
@@ -348,6 +350,21 @@ class BestSqueeze(Declared):
         normal, *across = (start + further * change @ self.direction).tolist()
         slipping = float(np.hypot(*across)) >= reactions.friction[self.contact] * normal
         return bool(slipping or normal >= self.max_push_n)
+
+
+def survives(
+    held: Grip, loads: LoadSet, scale: float, max_push_n: float, motors: Motors | None = None
+) -> bool:
+    """Return whether it is proved that a squeeze survives loads up to a scale (see `BestSqueeze`).
+
+    Pushes and torques may exceed their limits by a millionth, as numbers of files are rounded.
+    """
+    survival, local = Survival.of(held, loads, motors), held.local_squeeze
+    rows = survival.rows(Cuts.first(len(survival.friction)))
+    within = rows.reached(local, scale) <= rows.limits(max_push_n) * (1.0 + FILED_SLACK)
+    reactions = survival.reactions(local)
+    proofs = reactions.multipliers(scale)
+    return bool(within[rows.limited].all()) and reactions.survives(scale, proofs)
 
 
 def no_scale(survival: Survival, max_push_n: float) -> float:

@@ -242,6 +242,12 @@ class Coupling(Declared):
                 f"{self.ratio:g} for {self.joint}"
             )
 
+    @property
+    def equation(self) -> str:
+        """Return how the joint follows, as an equation with an offset in degrees."""
+        said, offset = f"{self.joint} = {self.ratio:g} {self.driver}", np.degrees(self.offset)
+        return f"{said} {'-' if offset < 0.0 else '+'} {abs(offset):.4g} deg" if offset else said
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Drives:

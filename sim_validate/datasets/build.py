@@ -8,8 +8,10 @@ from typing import NamedTuple
 from grasp_core.errors import InputError
 from grasp_core.files.file_kinds import MANIFEST
 from grasp_core.files.text_files import read_text, write_text
+from grasp_core.names import HANDS
 from sim_validate.datasets.computing import Engine, compute_all, compute_unit
 from sim_validate.datasets.config import DatasetConfig, config_to_toml, settings_text
+from sim_validate.datasets.hand_files import HandFiles
 from sim_validate.datasets.layout import CONFIG, OWN_FILES, STAGING_FOLDER
 from sim_validate.datasets.manifest import Manifest, path_inside, read_manifest
 from sim_validate.datasets.parquet import pyarrow
@@ -40,18 +42,22 @@ def build(
 ) -> Built:
     """Build a dataset, or resume an interrupted build; `report` takes (finished, total)."""
     pyarrow()  # before any work, so that a missing library is named at once
-    units = units_of(config)
+    hand = None if config.hand is None else HandFiles.of(config.hand, folder)
+    place = None if hand is None else hand.folder(folder)
+    units = units_of(config, place)
     _refuse_sources_inside(units, config, folder)
     with alone_in(folder):
         _refuse_others(folder, config)
         staging, unfinished = Staging(folder.resolve() / STAGING_FOLDER), list[WorkUnit]()
         if not (folder / MANIFEST).is_file():
             write_text(folder / CONFIG, config_to_toml(config))
+            if hand is not None:
+                hand.keep(folder)
             unfinished = staging.unfinished(units)  # an interrupted build is resumed with these
             _check_simulator(config, unfinished)
             compute_all(unfinished, staging, engine, report, timeout_s, compute_unit)
-            rows = write_rows(folder, config, units, staging)
-            write_card_and_manifest(folder, config, rows)
+            rows = write_rows(folder, config, units, staging, place)
+            write_card_and_manifest(folder, config, rows, place)
         staging.remove()
         manifest = read_manifest(folder)
         _check_manifest(manifest, folder, units)
@@ -61,6 +67,8 @@ def build(
 def _refuse_sources_inside(units: Sequence[WorkUnit], config: DatasetConfig, folder: Path) -> None:
     sources = [unit.path for unit in units if unit.path is not None]
     sources += [Path(config.contacts).resolve()] if config.contacts else []
+    if config.hand is not None and config.hand.hand not in HANDS:
+        sources.append(Path(config.hand.hand).resolve())
     for path in sources:
         if path.is_relative_to(folder.resolve()):
             raise InputError(
@@ -101,8 +109,8 @@ def _check_simulator(config: DatasetConfig, units: Sequence[WorkUnit]) -> None:
 def _check_manifest(manifest: Manifest, folder: Path, units: Sequence[WorkUnit]) -> None:
     if manifest.units_sha256 != units_sha256(units):
         raise InputError(
-            f"{folder}: this dataset is finished, but its meshes, contacts or package versions "
-            "have changed since then; give another --out to make it again"
+            f"{folder}: this dataset is finished, but its meshes, contacts, hand or package "
+            "versions have changed since then; give another --out to make it again"
         )
     for each in manifest.files:
         path = path_inside(folder, each.path)

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from grasp_core.hands.hand import Hand
 from scenes.drawing.pages import filled
 from sim_validate.datasets.columns import ROW_CLASSES
 from sim_validate.datasets.config import (
@@ -31,7 +32,7 @@ a few such as ODbL-1.0, there `odbl`."""
 ADDRESS = re.compile(r"https?://[^\s<>\"'`\\|{}^]+")
 
 
-def card_text(config: DatasetConfig, manifest: Manifest) -> str:
+def card_text(config: DatasetConfig, manifest: Manifest, hand: Hand | None = None) -> str:
     """Write the README.md of a dataset."""
     rows, tables = manifest.rows, list(_tables(manifest))
     (of_grasps,) = (table["splits"] for table in tables if table["name"] == "grasps")
@@ -48,6 +49,9 @@ def card_text(config: DatasetConfig, manifest: Manifest) -> str:
         rows=rows,
         tables=tables,
         executed=config.execution,
+        hand=hand,
+        hand_asked=config.hand,
+        joints=[] if hand is None else list(_joints(hand)),
         hub_license=config.license.lower() if SPDX.fullmatch(config.license) else "",
         credits={
             "Creator": _as_markdown(config.creator),
@@ -82,6 +86,20 @@ def _tables(manifest: Manifest) -> Iterator[Mapping[str, Any]]:
             "splits": splits,
             "sorted_by": " and ".join(f"`{key}`" for key in KEYS[name]),
             "columns": columns,
+        }
+
+
+def _joints(hand: Hand) -> Iterator[Mapping[str, Any]]:
+    """Yield what the card says of each joint, in the order of the columns of joint angles."""
+    followed = {each.joint: each.equation for each in hand.couplings}
+    fingers = [finger.name for finger in hand.fingers for _ in finger.links]
+    for joint, finger, (low, high) in zip(hand.joints, fingers, hand.ranges.tolist(), strict=True):
+        yield {
+            "name": _as_markdown(joint.name),
+            "finger": _as_markdown(finger),
+            "range": f"{low:.4g} to {high:.4g}",
+            "torque": "" if joint.torque_limit_n_m is None else f"{joint.torque_limit_n_m:g}",
+            "follows": _as_markdown(followed.get(joint.name, "")),
         }
 
 

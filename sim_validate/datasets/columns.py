@@ -22,7 +22,15 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.given_contacts import seat
 from grasp_core.values import FINGERS, Contact
 from sim_validate.closure.verdict import Verdict
-from sim_validate.datasets.config import EXECUTED, TABLE_NAMES, SplitName, TableName, id_beginning
+from sim_validate.datasets.config import (
+    EXECUTED,
+    HAND,
+    TABLE_NAMES,
+    SplitName,
+    TableName,
+    id_beginning,
+)
+from sim_validate.datasets.hand_columns import HandCells
 from sim_validate.datasets.parquet import (
     InGroup,
     Known,
@@ -56,7 +64,6 @@ ByFinger: TypeAlias = Annotated[Array, Shape(None, 3, nan=True)]
 """A vector for each finger, (k, 3); tables have four, null after the last."""
 FourLengths: TypeAlias = Annotated[Array, Shape(FINGERS, nan=True)]
 Four: TypeAlias = Annotated[Indices, Shape(FINGERS, whole=True)]
-Joints: TypeAlias = Annotated[Array, Shape("hand")]
 FourPoints: TypeAlias = Annotated[Array, Shape(FINGERS, 3)]
 
 
@@ -225,24 +232,8 @@ class GraspRow(Declared):
     least_squeeze_n: Annotated[ByFinger | None, InGroup("least_squeeze")] = None
     """Contact forces at rest with that push."""
 
-    hand_reached: Annotated[bool | None, InGroup("hand")] = None
-    """Whether a pose of the hand was found; null if not closed."""
-    hand_reason: Annotated[str | None, InGroup("hand")] = None
-    """Why no pose was found; empty where one was."""
-    hand_fingers: Annotated[Four | None, InGroup("hand")] = None
-    """Number of the hand's finger at each contact."""
-    hand_joints_rad: Annotated[Joints | None, InGroup("hand")] = None
-    """Joint angles, finger by finger from the palm."""
-    T_object_palm_m: Annotated[Annotated[Array, Shape(4, 4)] | None, InGroup("hand")] = None
-    """Pose of the palm in the object's frame."""
-    hand_points_m: Annotated[FourPoints | None, InGroup("hand")] = None
-    """Contacts of the fingertips."""
-    hand_normals: Annotated[FourPoints | None, InGroup("hand")] = None
-    """Inward unit normals at these."""
-    hand_open_joints_rad: Annotated[Joints | None, InGroup("hand")] = None
-    """Joint angles with open fingers; null if none found."""
-    hand_approach: Annotated[Annotated[Array, Shape(3)] | None, InGroup("hand")] = None
-    """Direction of the palm's straight way in; null if none."""
+    hand: Annotated[HandCells | None, FLAT, InGroup(HAND)] = None
+    """The pose of a hand and what it does there."""
 
     def _check_together(self) -> None:
         for name in ("contact_points_m", "contact_normals"):
@@ -263,7 +254,6 @@ class GraspRow(Declared):
             raise InputError(f"held is {self.held}, but `outcome` is {self.outcome!r}")
 
         self._check_execution()
-        self._check_pose()
 
     def _check_execution(self) -> None:
         claims = [name for name in CLAIMS if getattr(self, name) is not None]
@@ -273,16 +263,6 @@ class GraspRow(Declared):
             raise InputError("the row claims results of an execution, although none was simulated")
         if self.executed and (self.squeeze_n is None or None in (self.mass_kg, self.load_multiple)):
             raise InputError("an executed row must have its squeeze, its mass and what it carries")
-
-    def _check_pose(self) -> None:
-        if self.hand_reached is not None and self.hand_reached == bool(self.hand_reason):
-            raise InputError(
-                f"hand_reason is {self.hand_reason!r}, but hand_reached is {self.hand_reached}"
-            )
-        pose = (self.hand_joints_rad, self.T_object_palm_m, self.hand_fingers, self.hand_points_m,
-                self.hand_normals)  # fmt: skip
-        if {each is not None for each in pose} != {bool(self.hand_reached)}:
-            raise InputError("the pose of a hand must be there exactly where hand_reached is true")
 
     @property
     def was_tried(self) -> bool:
@@ -387,10 +367,13 @@ def groups_asked() -> Iterator[str]:
     yield from dict.fromkeys(mark.group for mark in marks if isinstance(mark, InGroup))
 
 
-def dataset_tables(groups: Mapping[str, int]) -> Tables:
-    """Return the tables of a dataset with their columns; groups of columns have their sizes."""
+def dataset_tables(groups: Mapping[str, int], joints: tuple[str, ...] = ()) -> Tables:
+    """Return the tables of a dataset with their columns; groups of columns have their sizes.
+
+    Columns with a number for each joint name the joints where these are known.
+    """
     return {
-        name: columns_of(ROW_CLASSES[name], groups)
+        name: columns_of(ROW_CLASSES[name], groups, {HAND: joints})
         for name in TABLE_NAMES
         if name != "executions" or EXECUTED in groups
     }

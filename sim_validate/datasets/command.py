@@ -18,6 +18,7 @@ from sim_validate.datasets.clusters import workers_of
 from sim_validate.datasets.config import (
     CREDITS,
     DatasetConfig,
+    DatasetHand,
     Learning,
     PlannedContent,
     config_from_toml,
@@ -38,10 +39,13 @@ def _configuration(command: dataset_flags.BuildFlags) -> DatasetConfig:
     first = Path(command.objects[0]) if command.objects else Path()
     if first.suffix != ".toml":
         learning = None if command.learning == Learning() else command.learning
+        hand = None if command.hand == DatasetHand() else command.hand
         objects = _listed(command.objects)
-        return extended(DatasetConfig, command.content, objects=objects, learning=learning)
-    if len(command.objects) > 1 or (command.content, command.learning) != (
-        PlannedContent(), Learning(),
+        return extended(
+            DatasetConfig, command.content, objects=objects, learning=learning, hand=hand
+        )
+    if len(command.objects) > 1 or (command.content, command.learning, command.hand) != (
+        PlannedContent(), Learning(), DatasetHand(),
     ):  # fmt: skip
         raise InputError(
             f"{first} holds all settings of the dataset: give no other objects and no flags but "
@@ -119,7 +123,9 @@ def export_dataset(command: dataset_flags.ExportFlags, reporter: Reporter) -> in
 
 def _warn(config: DatasetConfig, reporter: Reporter) -> None:
     """Warn of what a dataset will lack or give away, as that cannot be changed later."""
-    absolute = [name for name in (*config.objects, config.contacts) if Path(name).is_absolute()]
+    hand = "" if config.hand is None else config.hand.hand
+    paths = (*config.objects, config.contacts, hand)
+    absolute = [name for name in paths if Path(name).is_absolute()]
     if absolute and not reporter.quiet:
         reporter.warn(
             f"{CONFIG} and {CARD} will hold the path {absolute[0]}, so they differ on a machine "

@@ -18,10 +18,10 @@ from grasp_core.declared import declared
 from grasp_core.errors import InputError, about
 from grasp_core.mesh_files.limits import FaceKind, FileLengths
 from grasp_core.messages import shown
-from grasp_core.names import METHODS, ConeKind, Method
+from grasp_core.names import HANDS, METHODS, ConeKind, Method
 from grasp_core.settings import Settings, as_table
 from sim_validate.files.toml_files import quoted
-from sim_validate.settings import ExecutionSettings, LimitSearch
+from sim_validate.settings import ExecutionSettings, HandTrials, LimitSearch
 
 TableName: TypeAlias = Literal["objects", "grasps", "trials", "executions"]
 TABLE_NAMES: tuple[TableName, ...] = get_args(TableName)
@@ -53,7 +53,8 @@ def id_beginning(object_id: str, friction: float) -> str:
 
 EXECUTING = "execution"
 LEARNING = "learning"
-BuiltInHand: TypeAlias = Literal["", "allegro", "allegro-urdf", "leap"]
+HAND = "hand"
+"""The table of settings about a hand, and the group of columns with what it does."""
 FigureGroup: TypeAlias = Literal["closure", "least_squeeze", "placement"]
 CONTROL_KINDS = 5
 """Number of kinds of synthetic negative controls that a grasp has at most."""
@@ -82,8 +83,6 @@ class Learning(Settings):
     """Seeds by which objects are misplaced once more in executions, besides the execution's own."""
     synthetic: Annotated[int, Interval(ge=0, le=CONTROL_KINDS)] = CONTROL_KINDS
     """Largest number of synthetic negative controls of each grasp, drawn from all that exist."""
-    hand: BuiltInHand = ""
-    """Built-in hand whose pose is looked for in each grasp in force closure; empty for none."""
 
     def _check_together(self) -> None:
         for name in ("figures", "seeds"):
@@ -94,8 +93,7 @@ class Learning(Settings):
         """Return the groups of columns that the tables have on request, with their sizes."""
         chosen = ["kinds", *self.figures]
         chosen += ["margins"] if executed else []
-        sized = {"hand": _joints_of(self.hand)} if self.hand else {}
-        return {**dict.fromkeys(chosen, 1), **sized}
+        return dict.fromkeys(chosen, 1)
 
     @property
     def executes(self) -> str:
@@ -105,10 +103,20 @@ class Learning(Settings):
         return next((name for name, value in used.items() if value), "")
 
 
-def _joints_of(hand: str) -> int:
-    from grasp_core.hands.hand import load_hand  # slow, and no flag needs it
+@declared
+class DatasetHand(HandTrials):
+    """The hand whose pose is looked for in each grasp in force closure, and what it does there."""
 
-    return len(load_hand(hand).joints)
+    hand: str = ""
+    """Hand whose pose is looked for in each grasp in force closure: `allegro`, `allegro-urdf`,
+    `leap`, or an MJCF or URDF file; none if empty."""
+    fingertips: tuple[str, ...] = ()
+    """For a hand from a file: names of sites, geoms or bodies that are fingertips."""
+
+    def _check_together(self) -> None:
+        HandTrials._check_together(self)
+        if self.hand in HANDS and self.fingertips:
+            raise InputError(f"fingertips: the built-in hand {self.hand} has its own; remove them")
 
 
 @declared
@@ -169,6 +177,8 @@ class DatasetConfig(PlannedContent):
     """How grasps are executed besides: with true mass and springy fingers; None to leave it out."""
     learning: Learning | None = None
     """What the tables hold besides for learners; None for nothing."""
+    hand: DatasetHand | None = None
+    """The hand that looks for poses in grasps, and what it does there; None for none."""
 
     def _check_together(self) -> None:
         for name in ("objects", "frictions", "families"):
@@ -189,6 +199,11 @@ class DatasetConfig(PlannedContent):
                 f"{LEARNING}.{self.learning.executes}: only executed grasps have a mass and a "
                 f"squeeze; add a table [{EXECUTING}], or leave this setting out"
             )
+        if self.hand is not None and not self.hand.hand:
+            raise InputError(
+                f"{HAND}.{HAND}: missing; choose from {', '.join(HANDS)}, or name an MJCF or URDF "
+                "file"
+            )
         if self.published and not _is_date(self.published):
             raise InputError(
                 f"published: expected a day such as 2026-11-22, got {shown(self.published)}"
@@ -199,12 +214,15 @@ class DatasetConfig(PlannedContent):
         """What the tables hold besides for learners, with nothing for None."""
         return self.learning or Learning()
 
-    @property
-    def groups(self) -> dict[str, int]:
-        """Groups of columns that the tables have on request, with their sizes."""
+    def groups(self, joints: int) -> dict[str, int]:
+        """Return the groups of columns that the tables have on request, with their sizes.
+
+        The size of those about the hand is its number of joints.
+        """
         executed = self.execution is not None
         asked = {} if self.learning is None else self.learning.groups(executed=executed)
-        return {**({EXECUTED: 1} if executed else {}), **asked}
+        own = {HAND: joints} if self.hand is not None else {}
+        return {**({EXECUTED: 1} if executed else {}), **asked, **own}
 
     @property
     def sha256(self) -> str:
@@ -240,7 +258,7 @@ def config_to_toml(config: DatasetConfig) -> str:
 def settings_text(config: DatasetConfig) -> str:
     """Write every setting in the order of the class; equal configurations give equal texts."""
     given = as_table(config)
-    tables = {name: given.pop(name) for name in (EXECUTING, LEARNING) if name in given}
+    tables = {name: given.pop(name) for name in (EXECUTING, LEARNING, HAND) if name in given}
     parts = [_lines(given), *(f"[{name}]\n{_lines(each)}" for name, each in tables.items())]
     return "\n".join(parts)
 

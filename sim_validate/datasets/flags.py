@@ -10,7 +10,13 @@ from grasp_core.allowed_values import Count, Seed, Share
 from grasp_core.declared import declared
 from grasp_core.settings import Settings
 from sim_validate.commands.flags import BARE, Positive, Spoken
-from sim_validate.datasets.config import Content, Learning, PlannedContent, SplitName
+from sim_validate.datasets.config import (
+    Content,
+    DatasetHand,
+    Learning,
+    PlannedContent,
+    SplitName,
+)
 from sim_validate.processes.workers import available_cores
 
 
@@ -40,6 +46,7 @@ class BuildFlags(Spoken):
     """Folder of the dataset."""
     content: Annotated[PlannedContent, BARE] = field(default_factory=PlannedContent)
     learning: Annotated[Learning, BARE] = field(default_factory=Learning)
+    hand: Annotated[DatasetHand, BARE] = field(default_factory=DatasetHand)
     work: Annotated[Working, BARE] = field(default_factory=Working)
 
 

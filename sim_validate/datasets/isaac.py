@@ -16,11 +16,8 @@ from sim_validate.datasets.columns import GraspRow, ObjectRow
 from sim_validate.datasets.config import ID_DIGITS, SplitName
 from sim_validate.datasets.open_dataset import select
 from sim_validate.files.output_folders import whole_folder
-from sim_validate.hands.isaac import IsaacGrasp, isaac_text
+from sim_validate.hands.isaac import BY_THE_HAND, UNTRIED, IsaacGrasp, isaac_text
 
-BY_FINGERTIPS = (
-    "1.0 if four fingertips without a hand held the object in all simulated trials, else 0.0"
-)
 UNSAFE = re.compile(r"[^A-Za-z0-9._-]")
 LONGEST_NAME = 150
 """Largest number of characters in a file's name without its ending; every file system allows more.
@@ -60,7 +57,7 @@ def export(
             # the object's hash tells files apart, whatever of its name they can keep
             of = names.get(object_id, object_id)
             name = UNSAFE.sub("_", f"{object_id[:ID_DIGITS]}-{of}")[:LONGEST_NAME]
-            write_text(place / f"{name}.yaml", isaac_text(hand, of, found, BY_FINGERTIPS))
+            write_text(place / f"{name}.yaml", isaac_text(hand, of, found, BY_THE_HAND))
             done.update(objects=1, grasps=len(found))
             report(done["objects"], len(names))
     return done
@@ -68,8 +65,9 @@ def export(
 
 def _pose(row: GraspRow) -> IsaacGrasp | None:
     """Take the pose of the hand from a row; None where it has none with open fingers."""
-    pose, joints, opened = row.T_object_palm_m, row.hand_joints_rad, row.hand_open_joints_rad
-    if pose is None or joints is None or opened is None:
+    hand = row.hand
+    if hand is None or hand.palm_pose is None or hand.joints is None or hand.open_joints is None:
         return None
-    kept = bool(row.held) and row.survived is not False
-    return IsaacGrasp(row.grasp_id, float(kept), pose, joints, opened)
+    tried = [each for each in (hand.held, hand.survived) if each is not None]
+    trusted = float(all(tried)) if tried else UNTRIED
+    return IsaacGrasp(row.grasp_id, trusted, hand.palm_pose, hand.joints, hand.open_joints)

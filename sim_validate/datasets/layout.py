@@ -11,9 +11,14 @@ DATA = "data"
 MESH_FOLDER, SCENE_FOLDER = "meshes", "scenes"
 FILE_FOLDERS = (MESH_FOLDER, SCENE_FOLDER)
 """Folders of the files that are beside the tables."""
+HAND_FOLDER = "hands"
+"""Folder of the hand, whose files are in a folder called by their hash."""
+HAND_RECORD = "hand.json"
+"""Name of the file with the hand as it was read, in the folder of its files."""
 STAGING_FOLDER = "staging"
 """Folder of finished units of work, which is there until the dataset is finished."""
 OWN_FILES = (
-    STAGING_FOLDER, DATA, *FILE_FOLDERS, GIVEN_CONTACTS, CONFIG, QUARANTINE, CARD, MANIFEST,
+    STAGING_FOLDER, DATA, *FILE_FOLDERS, HAND_FOLDER, GIVEN_CONTACTS, CONFIG, QUARANTINE, CARD,
+    MANIFEST,
 )  # fmt: skip
 """Names of all files and folders that a build writes."""

@@ -1,4 +1,4 @@
-"""Makes what a dataset has on request: executions, figures, poses of a hand, and varied grasps.
+"""Makes what a dataset has on request: executions, figures, and varied grasps.
 
 Varied grasps are natural negatives, and natural positives beside them: nothing but the analysis and
 the simulation tells which of them hold. Friction is drawn below, near and above the critical one.
@@ -14,7 +14,6 @@ import math
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cache
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -29,8 +28,6 @@ from grasp_core.errors import GraspError, InputError, NoForcesError, SolverError
 from grasp_core.execution.best_squeeze import best_squeeze
 from grasp_core.execution.loads import any_direction
 from grasp_core.geometry.polygons import convex_hull, edge_rows, plane_frame
-from grasp_core.hands.hand import load_hand
-from grasp_core.hands.reach import reach_with
 from grasp_core.objects.on_faces import within
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.given_contacts import Seated, grasp_of, seat
@@ -135,10 +132,6 @@ def execution_rows(name: str, executed: Executed, config: DatasetConfig) -> Iter
         yield ExecutionRow(name, number, trial, next(seeds) if trial.kind == MISPLACED else None)
 
 
-hand_named = cache(load_hand)
-"""Return a built-in hand, one value for all grasps of a process, as searches are kept by it."""
-
-
 def contact_cells(config: DatasetConfig, body: Polyhedron, contacts: Sequence[Contact]) -> RowCells:
     """Return the figures on request that any contacts have, closed or not."""
     if "closure" not in config.asked.figures:
@@ -162,25 +155,6 @@ def placement_cells(
     bounded = usual_bound(body, grasp, friction)
     missing = isinstance(bounded, str)
     return {"closed_share_reason": bounded} if missing else {"closed_share": bounded.lower}
-
-
-def hand_cells(config: DatasetConfig, body: Polyhedron, grasp: Grasp, friction: float) -> RowCells:
-    """Return the pose of a hand in a grasp in force closure, if one is asked for."""
-    if not config.asked.hand:
-        return {}
-    found = reach_with(hand_named(config.asked.hand), body, grasp, friction, seed=config.seed)
-    contacts = found.contacts
-    return {
-        "hand_reached": found.reached,
-        "hand_reason": found.reason,
-        "hand_fingers": found.fingers,
-        "hand_joints_rad": found.joints,
-        "T_object_palm_m": found.palm_pose,
-        "hand_open_joints_rad": found.pregrasp,
-        "hand_approach": found.approach,
-        "hand_points_m": contacts and [contact.position for contact in contacts],
-        "hand_normals": contacts and [contact.normal for contact in contacts],
-    }
 
 
 def squeeze_cells(config: DatasetConfig, body: Polyhedron, row: GraspRow) -> RowCells:

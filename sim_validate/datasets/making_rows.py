@@ -28,8 +28,10 @@ from sim_validate.datasets.columns import (
     TrialRow,
     VerdictCells,
 )
-from sim_validate.datasets.config import SPLITS, SplitName, id_beginning
+from sim_validate.datasets.config import HAND, SPLITS, SplitName, id_beginning
 from sim_validate.datasets.given_grasps import GraspToJudge
+from sim_validate.datasets.hand_files import kept_hand
+from sim_validate.datasets.hand_work import hand_cells
 from sim_validate.datasets.layout import SCENE_FOLDER
 from sim_validate.datasets.open_dataset import mesh_path, mesh_text
 from sim_validate.datasets.parquet import RowCells
@@ -121,6 +123,7 @@ class UnitRows:
 
     def __init__(self, unit: WorkUnit, body: Polyhedron) -> None:
         self.unit, self.body, self.config = unit, body, unit.config
+        self.hand = None if unit.hand is None else kept_hand(unit.hand)
         self.grasps, self.trials = list[GraspRow](), list[TrialRow]()
         self.executions = list[ExecutionRow]()
         # texts of the files, by their paths in the dataset's folder
@@ -251,7 +254,7 @@ class UnitRows:
         cells = {**self._about(tried.contacts), **cells, **tried.cells}
         if isinstance(proved, Grasp):
             cells |= learning.placement_cells(self.config, body, proved, cells["friction"])
-            cells |= learning.hand_cells(self.config, body, proved, cells["friction"])
+            cells |= self._hand_cells(body, proved, cells)
         closed = isinstance(verdict, Verdict)
         trials = verdict.wrenches if closed else verdict.tried
         ratio = learning.ratio_of(cells["friction"], cells.get("critical_friction"))
@@ -267,6 +270,15 @@ class UnitRows:
                 _Tried(body, each.control.contacts, proof, each), name=row.name, label=kind,
                 grasp_id=f"{row.grasp_id}:{kind}", kind=kind, control_of=row.grasp_id,
             )  # fmt: skip
+
+    def _hand_cells(self, body: Polyhedron, grasp: Grasp, cells: RowCells) -> RowCells:
+        """Return what the hand does in a grasp; in varied grasps it only looks for a pose."""
+        if self.hand is None:
+            return {}
+        simulated = cells["label"] != VARIED
+        return {HAND: hand_cells(
+            self.hand, self.config, body, grasp, cells["friction"], simulated=simulated
+        )}  # fmt: skip
 
 
 def _trial_row(grasp_id: str, number: int, tried: WrenchVerdict | ControlTrial) -> TrialRow:

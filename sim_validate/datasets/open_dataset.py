@@ -22,7 +22,7 @@ from grasp_core.allowed_values import one_of, path_of
 from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import object_of
 from grasp_core.files.records import Record, from_record, record_of
-from grasp_core.hands.hand import Hand, load_hand
+from grasp_core.hands.hand import Hand
 from grasp_core.mesh_files.limits import MeshChoices
 from grasp_core.mesh_files.reading import FileSurface, read_triangles
 from grasp_core.objects.build import DEFAULT_LIMITS, content_hash
@@ -38,7 +38,8 @@ from sim_validate.datasets.config import (
     TableName,
     config_from_toml,
 )
-from sim_validate.datasets.layout import CONFIG, MESH_FOLDER
+from sim_validate.datasets.hand_files import kept_hand
+from sim_validate.datasets.layout import CONFIG, HAND_FOLDER, HAND_RECORD, MESH_FOLDER
 from sim_validate.datasets.manifest import Manifest, path_inside, read_manifest
 from sim_validate.datasets.parquet import Columns, each_batch, read_columns
 from sim_validate.engine.setup import Agenda, Setup
@@ -59,10 +60,20 @@ class Dataset:
         return config_from_toml(self.folder / CONFIG)
 
     @cached_property
+    def hand_folder(self) -> Path | None:
+        """The folder with the files of the hand, each checked; None where there is no hand."""
+        own = [each for each in self.manifest.files if each.path.startswith(f"{HAND_FOLDER}/")]
+        for each in own:
+            if fault := each.fault(self.folder):
+                raise InputError(f"{each.path}: {fault}; see `graspproof dataset verify`")
+        records = (each.path for each in own if each.path.endswith(f"/{HAND_RECORD}"))
+        record = next(records, None)
+        return None if record is None else path_inside(self.folder, record).resolve().parent
+
+    @cached_property
     def hand(self) -> Hand | None:
-        """The hand whose poses the rows of grasps have; None if they have none."""
-        name = self.config.asked.hand
-        return load_hand(name) if name else None
+        """The hand whose poses the dataset holds, with its torque limits; None for none."""
+        return None if self.hand_folder is None else kept_hand(self.hand_folder)
 
     def paths(self, name: TableName) -> list[Path]:
         """List the files of a table, each checked to have the manifest's hash.
@@ -176,6 +187,17 @@ def load_dataset(folder: str | Path, split: str | None = None) -> dict[TableName
         )
     tables = chosen.manifest.tables
     return {name: read_columns(chosen.paths(name), name, tables) for name in tables}
+
+
+def load_dataset_hand(folder: str | Path) -> Hand | None:
+    """Return the hand whose poses a dataset holds; None for a dataset without one.
+
+    Columns with a number for each joint have them in the order of `Hand.joints`.
+
+    Raises:
+        InputError: The dataset is not finished, or a file of the hand is damaged.
+    """
+    return select(path_of(folder, "folder")).hand
 
 
 SURFACE_LINE = "# surface "

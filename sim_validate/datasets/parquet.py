@@ -11,6 +11,7 @@ is written one group of rows after another, so that memory does not grow.
 
 import importlib
 import io
+import json
 import math
 from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -70,17 +71,24 @@ class TableColumn:
     unit: str = ""
     shape: tuple[int, ...] = ()
     """Shape of each cell; () for a plain value."""
+    names: tuple[str, ...] = ()
+    """What the entries of each cell are about, in their order, where that is known."""
 
 
 Tables: TypeAlias = Mapping[TableName, tuple[TableColumn, ...]]
 Form: TypeAlias = tuple[CellKind, tuple[int, ...]]
 
 
-def columns_of(kind: type, groups: Mapping[str, int]) -> tuple[TableColumn, ...]:
+NAMELESS: Mapping[str, tuple[str, ...]] = {}
+
+
+def columns_of(
+    kind: type, groups: Mapping[str, int], named: Mapping[str, tuple[str, ...]] = NAMELESS
+) -> tuple[TableColumn, ...]:
     """Return the columns of a row class in a dataset with some groups of columns.
 
     A group's size is the length that has its name in the shape of an array; a length that is free
-    is the number of fingers.
+    is the number of fingers. Groups may say what the entries of such arrays are called.
     """
     found: list[TableColumn] = []
     for each in entries(kind):
@@ -88,14 +96,16 @@ def columns_of(kind: type, groups: Mapping[str, int]) -> tuple[TableColumn, ...]
         if any(isinstance(mark, InGroup) and mark.group not in groups for mark in marks):
             continue
         if each.flat is not None:
-            found += columns_of(each.flat, groups)
+            found += columns_of(each.flat, groups, named)
         else:
             form, meaning = _form(each.kind, groups), meanings(kind).get(each.name, "")
             assert form is not None, each.key  # noqa: S101 - all fields of row classes are cells
             unit = (unit_of(each.key) or "1") if form[0] == "float" else ""
-            found.append(
-                TableColumn(each.key, form[0], meaning.replace("None", "null"), unit, form[1])
-            )
+            lengths = (n for mark in marks if isinstance(mark, Shape) for n in mark.shape)
+            names = next((named[n] for n in lengths if isinstance(n, str) and n in named), ())
+            found.append(TableColumn(
+                each.key, form[0], meaning.replace("None", "null"), unit, form[1], names
+            ))  # fmt: skip
     return tuple(found)
 
 
@@ -332,6 +342,7 @@ def schema_of(columns: tuple[TableColumn, ...]) -> Any:
         for size in reversed(column.shape):
             kind = arrow.list_(kind, size)
         about = {"meaning": column.meaning} | ({"unit": column.unit} if column.unit else {})
+        about |= {"names": json.dumps(column.names)} if column.names else {}
         found.append(arrow.field(column.name, kind, metadata=about))
     return arrow.schema(found)
 

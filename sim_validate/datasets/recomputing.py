@@ -18,12 +18,13 @@ from grasp_core.provenance import arithmetic
 from sim_validate.datasets.columns import ROUNDOFF, DatasetRows, GraspRow, ObjectRow
 from sim_validate.datasets.config import KEYS, TableName
 from sim_validate.datasets.given_grasps import read_given
+from sim_validate.datasets.hand_files import kept_fault
 from sim_validate.datasets.layout import GIVEN_CONTACTS
 from sim_validate.datasets.making_rows import compute_rows
 from sim_validate.datasets.open_dataset import Dataset
 from sim_validate.datasets.parquet import RowCells
 from sim_validate.datasets.quarantine import TWIN, read_quarantine
-from sim_validate.datasets.row_checks import disagreements
+from sim_validate.datasets.row_faults import disagreements
 from sim_validate.datasets.work_units import WorkUnit, provenance
 from sim_validate.execution.verdict import may_slip
 
@@ -44,6 +45,13 @@ class Recomputing:
             if not each.reason.startswith(TWIN):
                 gone = self._quarantined.setdefault((each.source_sha256, each.friction), set())
                 gone.update(each.given)
+
+    def hand_fault(self) -> str:
+        """Say how the hand is not the one that its files describe, where numbers round alike."""
+        asked, folder = self._config.hand, self._dataset.hand_folder
+        if asked is None or folder is None or not self._exact:
+            return ""
+        return kept_fault(asked, folder)
 
     def frictions(self, row: ObjectRow) -> list[float]:
         """List the frictions at which an object has rows, perhaps without a grasp."""
@@ -73,7 +81,9 @@ class Recomputing:
         given = tuple(each for each in self._given if each.id not in gone)
         try:
             body = self._dataset.body(row.object_id, name)
-            made = compute_rows(WorkUnit(name, None, source, friction, self._config, given), body)
+            hand = self._dataset.hand_folder
+            unit = WorkUnit(name, None, source, friction, self._config, given, hand)
+            made = compute_rows(unit, body)
         except GraspError as error:
             yield f"the grasps cannot be computed again ({error})"
             return

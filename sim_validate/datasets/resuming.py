@@ -19,6 +19,7 @@ from grasp_core.files.records import RecordFile
 from grasp_core.messages import FieldError, shown
 from sim_validate.datasets.columns import dataset_tables
 from sim_validate.datasets.config import SplitName, TableName
+from sim_validate.datasets.hand_files import joint_names
 from sim_validate.datasets.making_rows import UnitRows
 from sim_validate.datasets.manifest import Listed, listed
 from sim_validate.datasets.parquet import parquet_bytes
@@ -69,7 +70,7 @@ class Staging:
 
     def write(self, unit: WorkUnit, made: UnitRows) -> None:
         """Keep the rows and files of a finished unit."""
-        kinds, rows = dataset_tables(unit.config.groups), made.rows
+        kinds, rows = dataset_tables(unit.groups, joint_names(unit.hand)), made.rows
         tables = {
             f"{name}.parquet": parquet_bytes(name, rows.cells(name, columns), kinds)
             for name, columns in kinds.items()

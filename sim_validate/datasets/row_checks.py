@@ -2,10 +2,8 @@
 
 A row is checked against its contacts and trials, and the grasp that it was made from. The multiple
 of the weight that a squeeze carries follows from contacts, squeeze, mass and springs alone, so it
-is proved again for every row; what a trial did is only simulated again in a sample. A pose of a
-hand is not searched for again: it counts if joints are within their ranges, fingertips touch the
-object at the stated contacts, the hand overlaps neither the object nor itself, and the contacts are
-proved to be in force closure at the row's friction.
+is proved again for every row; what a trial did is only simulated again in a sample. What is said of
+a hand is checked in `hand_checks`.
 """
 
 from collections import Counter, defaultdict
@@ -13,7 +11,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import cached_property
 from itertools import chain
-from typing import Any
 
 import numpy as np
 
@@ -23,13 +20,9 @@ from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import GraspError, InputError, UndecidedError
 from grasp_core.execution.grips import grip
 from grasp_core.execution.loads import any_direction
-from grasp_core.execution.squeeze_certificate import Survival
-from grasp_core.frames import POSE_SIZE
-from grasp_core.hands.collisions import clearances, tip_distances
-from grasp_core.hands.hand import Hand
+from grasp_core.execution.squeeze_certificate import survives
 from grasp_core.objects.on_faces import SolidSurface
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.values import FINGERS
 from sim_validate.datasets.columns import (
     FROM_TOOL,
     ROUNDOFF,
@@ -39,17 +32,17 @@ from sim_validate.datasets.columns import (
     ObjectRow,
 )
 from sim_validate.datasets.config import KEYS, REFERENCES, TABLE_NAMES, TableName
+from sim_validate.datasets.hand_checks import HandChecks
 from sim_validate.datasets.layout import CONFIG
 from sim_validate.datasets.learning import (
     VARIED_RATIOS,
     contact_cells,
-    hand_named,
     ratio_of,
     trial_cells,
 )
 from sim_validate.datasets.making_rows import PLANNED_KIND
 from sim_validate.datasets.open_dataset import Dataset
-from sim_validate.datasets.parquet import agrees
+from sim_validate.datasets.row_faults import disagreements
 from sim_validate.engine.held_or_let_go import Outcome
 from sim_validate.execution.holders import tip_radius
 from sim_validate.execution.verdict import ExecutionTrial
@@ -67,13 +60,6 @@ LABELS = {"grasp": PLANNED_KIND, FROM_TOOL: FROM_TOOL}
 """Kind of the rows of a label; other labels but `varied` are kinds themselves."""
 UNBALANCED = 1e-9
 """Wrench that balanced forces leave, relative to the forces, at object radius one."""
-TOUCHES_M = 2e-5
-"""Largest distance of a fingertip from its contact [m]: twice what the search allows."""
-APART_M = 4e-4
-"""Least distance of the hand's links from each other [m]; the search keeps 0.5 mm."""
-POSE_ROUNDING = 1e-9
-"""How far rounding may move an angle beyond its range [rad], a link into the object [m], a pose
-from a rigid motion, or a direction from unit length."""
 
 
 class RowChecks:
@@ -151,7 +137,8 @@ class RowChecks:
     def _requested_faults(self, row: GraspRow) -> Iterator[str]:
         """Check what a dataset has only on request, of a row whose object is there."""
         executed, learned = self.config.execution is not None, self.config.learning is not None
-        body = self.bodies.get(row.object_id) if executed or learned else None
+        asked = executed or learned or self.config.hand is not None
+        body = self.bodies.get(row.object_id) if asked else None
         if body is None:
             return
         if executed:
@@ -159,6 +146,8 @@ class RowChecks:
             yield from found or self._squeeze_faults(row, body)
         if learned:
             yield from self._learning_faults(row, body)
+        if self.part.hand is not None and self.config.hand is not None:
+            yield from HandChecks(self.part.hand, self.config.hand, row, body).faults()
 
     def _learning_faults(self, row: GraspRow, body: Polyhedron) -> Iterator[str]:
         if row.label == VARIED:
@@ -172,8 +161,6 @@ class RowChecks:
             yield from disagreements(row, by_contacts, "the contacts")
         if row.witness_forces_n is not None:
             yield from _witness_faults(row, row.witness_forces_n, body)
-        if self.config.asked.hand:
-            yield from _hand_faults(row, hand_named(self.config.asked.hand), body)
 
     def _variant_faults(self, row: GraspRow, body: Polyhedron) -> Iterator[str]:
         source = self.by_name.get(row.made_from or "")
@@ -247,13 +234,9 @@ class RowChecks:
         if faults := list(disagreements(row, {"mass_kg": settings.object_kg}, CONFIG)):
             yield from faults
             return
-        survival = Survival.of(held, any_direction(settings.object_kg))
-        reactions = survival.reactions(held.local_squeeze)
-        multiple = load * (1.0 - ROUNDOFF)
-        pushes = reactions.start[:, 0] + multiple * reactions.swing
         most_n = settings.push_n if push_n is None else push_n
-        limited = bool((pushes <= most_n * (1.0 + ROUNDOFF)).all())
-        if not (limited and reactions.survives(multiple, reactions.multipliers(multiple))):
+        loads = any_direction(settings.object_kg)
+        if not survives(held, loads, load * (1.0 - ROUNDOFF), most_n):
             stated = getattr(row, claim)
             yield f"{claim} is {stated:.9g}, but the squeeze is not proved to carry as much"
 
@@ -289,70 +272,3 @@ def _witness_faults(row: GraspRow, forces: Array, body: Polyhedron) -> Iterator[
     in_cones = (across <= row.friction * pushes * (1.0 + ROUNDOFF) + UNBALANCED).all()
     if not in_cones or np.abs(left).max() > ROUNDOFF or abs(pushes.sum() - 1.0) > ROUNDOFF:
         yield "witness_forces_n are no balanced forces in the friction cones"
-
-
-def _hand_faults(row: GraspRow, hand: Hand, body: Polyhedron) -> Iterator[str]:
-    if bool(row.force_closed) != (row.hand_reached is not None):
-        yield f"hand_reached is {row.hand_reached}, but force_closed is {row.force_closed}"
-    joints, pose, fingers = row.hand_joints_rad, row.T_object_palm_m, row.hand_fingers
-    points, normals = row.hand_points_m, row.hand_normals
-    if joints is None or pose is None or fingers is None or points is None or normals is None:
-        return  # the hand does not reach the grasp
-    standing: list[int] = fingers.tolist()
-    if len({*standing}) < FINGERS or fingers.max() >= len(hand.fingers):
-        yield f"hand_fingers are {standing}, not {FINGERS} of the hand's {len(hand.fingers)}"
-        return
-    surface, turn = SolidSurface(body.vertices, body.triangles), pose[:3, :3]
-    roundings = np.array([hand.fingers[finger].tip.core[1] for finger in standing])
-    behind = points - roundings[:, None] * normals  # within the tips, as deep as they are rounded
-    gaps = tip_distances(hand, joints, pose, standing, behind) + roundings
-    found, way = clearances(hand, body, joints, pose, fingers), row.hand_approach
-    rules = {
-        "hand_joints_rad are not within the ranges of the joints": _in_ranges(joints, hand),
-        "hand_open_joints_rad are not within the ranges of the joints": (
-            row.hand_open_joints_rad is None or _in_ranges(row.hand_open_joints_rad, hand)
-        ),
-        "T_object_palm_m is not a rigid motion": (
-            np.abs(turn @ turn.T - np.eye(3)).max() <= POSE_ROUNDING and np.linalg.det(turn) > 0.0
-            and pose[3].tolist() == np.eye(POSE_SIZE)[3].tolist()
-        ),
-        "hand_approach is not of unit length": (
-            way is None or abs(np.linalg.norm(way) - 1.0) <= POSE_ROUNDING
-        ),
-        "hand_points_m are not on the object, or hand_normals not its normals there": all(
-            surface.holds(point, normal, TOUCHES_M)
-            for point, normal in zip(points, normals, strict=True)
-        ),
-        "the fingertips of hand_joints_rad do not touch the object at hand_points_m": (
-            gaps.max() <= TOUCHES_M
-        ),
-        # a link whose tip touches the object may come as near to it as it likes
-        "the hand of hand_joints_rad overlaps the object or itself": (
-            found.itself >= APART_M and found.object >= -POSE_ROUNDING and found.tips >= -TOUCHES_M
-        ),
-        "hand_points_m are not proved to be in force closure": (
-            _is_proved(points, normals, row.friction)
-        ),
-    }  # fmt: skip
-    yield from (fault for fault, fits in rules.items() if not fits)
-
-
-def _in_ranges(angles: Array, hand: Hand) -> bool:
-    low, high = hand.ranges.T
-    return bool(((angles >= low - POSE_ROUNDING) & (angles <= high + POSE_ROUNDING)).all())
-
-
-def _is_proved(points: Array, normals: Array, friction: float) -> bool:
-    try:
-        certificate = force_closure(points, normals, friction)
-        return certificate.closed and certificate.verify()
-    except GraspError:
-        return False
-
-
-def disagreements(row: GraspRow, wanted: Mapping[str, Any], source: str) -> Iterator[str]:
-    """Yield cells of a row that something else says otherwise, beyond what their kinds allow."""
-    for name, value in wanted.items():
-        stated = getattr(row, name)
-        if not agrees(GraspRow, name, stated, value):
-            yield f"{name} is {stated}, but {value} by {source}"

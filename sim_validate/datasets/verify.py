@@ -10,7 +10,8 @@ from grasp_core.errors import InputError
 from grasp_core.files.file_kinds import MANIFEST, QUARANTINE
 from sim_validate.datasets.columns import DatasetRows, ObjectRow
 from sim_validate.datasets.config import SPLITS
-from sim_validate.datasets.layout import CONFIG, STAGING_FOLDER
+from sim_validate.datasets.hand_files import HandFiles, joint_names
+from sim_validate.datasets.layout import CONFIG, HAND_FOLDER, STAGING_FOLDER
 from sim_validate.datasets.open_dataset import Dataset, select
 from sim_validate.datasets.parquet import pyarrow
 from sim_validate.datasets.quarantine import read_quarantine
@@ -67,7 +68,12 @@ def _manifest_faults(dataset: Dataset) -> Iterator[str]:
     manifest, config = dataset.manifest, dataset.config
     if config.sha256 != manifest.config_sha256:
         yield f"{CONFIG}: the file is not the configuration that the manifest names"
-    if manifest.groups != config.groups:
+    hand = dataset.hand_folder
+    if (hand is None) != (config.hand is None):
+        yield f"{HAND_FOLDER}: the dataset keeps a hand, or none, unlike {CONFIG}"
+    elif hand is not None and HandFiles.kept(hand).sha256 != hand.name:
+        yield f"{HAND_FOLDER}/{hand.name}: the files are others than the name of their folder says"
+    if manifest.groups != config.groups(len(joint_names(hand))):
         yield f"{MANIFEST}: `groups` is {manifest.groups}, unlike {CONFIG}"
     lines = len(read_quarantine(dataset.folder / QUARANTINE))
     if lines != manifest.quarantined:
@@ -85,6 +91,8 @@ def _manifest_faults(dataset: Dataset) -> Iterator[str]:
 
 def _sample_faults(dataset: Dataset, share: float, seed: int) -> Iterator[str]:
     recomputing = Recomputing(dataset)
+    if fault := recomputing.hand_fault():
+        yield fault
     units = [
         (row.object_id, friction)
         for row in dataset.rows(ObjectRow)

@@ -1,8 +1,8 @@
 """Splits a configuration into units of work, each of which can be computed anywhere, in any order.
 
 A unit is one object at one friction. Its name is a hash of all that decides its rows: the bytes of
-the mesh, the configuration, the versions of the packages, and this project's own code. So results
-of an earlier run count exactly if they would come out the same.
+the mesh and of the hand, the configuration, the versions of the packages, and this project's own
+code. So results of an earlier run count exactly if they would come out the same.
 """
 
 import hashlib
@@ -21,8 +21,9 @@ from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron
 from grasp_core.provenance import versions
 from grasp_core.settings import as_table
 from scenes.example_objects import example_object
-from sim_validate.datasets.config import CREDITS, DatasetConfig
+from sim_validate.datasets.config import CREDITS, HAND, DatasetConfig
 from sim_validate.datasets.given_grasps import GraspToJudge, read_given
+from sim_validate.datasets.hand_files import joint_names
 from sim_validate.planning.asked_objects import is_mesh_file
 
 GIVEN_PER_UNIT = 25
@@ -50,6 +51,13 @@ class WorkUnit:
     config: DatasetConfig
     given: tuple[GraspToJudge, ...] = ()
     """Grasps to judge; empty if grasps are to be planned."""
+    hand: Path | None = None
+    """Absolute path of the folder with the hand's files, called by their hash; None for none."""
+
+    @property
+    def groups(self) -> dict[str, int]:
+        """Groups of columns that its tables have on request, with their sizes."""
+        return self.config.groups(len(joint_names(self.hand)))
 
     @property
     def label(self) -> str:
@@ -61,11 +69,13 @@ class WorkUnit:
 
     @property
     def id(self) -> str:
-        """Name of the unit: 32 hexadecimal digits, the same wherever the mesh file lies."""
+        """Name of the unit: 32 hexadecimal digits, the same wherever mesh and hand files lie."""
         table = as_table(self.config)
         settings = {name: value for name, value in table.items() if name not in UNDECISIVE}
         given = json.dumps([record_of(grasp) for grasp in self.given])
         digest = hashlib.sha256(given.encode()).hexdigest()
+        if self.hand is not None:  # its hash stands for the path
+            settings[HAND] |= {HAND: self.hand.name}
         own = sorted(provenance().items())
         decisive = [self.source_sha256, self.friction, digest, settings, own]
         return hashlib.sha256(json.dumps(decisive).encode()).hexdigest()[:32]
@@ -92,8 +102,11 @@ def provenance() -> Mapping[str, str]:
     return MappingProxyType(versions() | more)
 
 
-def units_of(config: DatasetConfig) -> list[WorkUnit]:
-    """Split a configuration into units of work, each one object at one friction, sorted by name."""
+def units_of(config: DatasetConfig, hand: Path | None = None) -> list[WorkUnit]:
+    """Split a configuration into units of work, each one object at one friction, sorted by name.
+
+    The files of the hand, if there is one, are in a folder called by their hash.
+    """
     hashes = {name: _source_sha256(name) for name in config.objects}
     paths = {name: Path(name).resolve() if is_mesh_file(name) else None for name in hashes}
     parts: list[tuple[GraspToJudge, ...]] = [()]
@@ -103,7 +116,7 @@ def units_of(config: DatasetConfig) -> list[WorkUnit]:
     units = [
         WorkUnit(
             name, paths[name], hashes[name], friction,
-            replace(config, objects=(name,), frictions=(friction,)), part,
+            replace(config, objects=(name,), frictions=(friction,)), part, hand,
         )
         for name in config.objects
         for friction in config.frictions

@@ -6,7 +6,7 @@ are in memory.
 """
 
 import shutil
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import groupby, product
 from pathlib import Path
@@ -19,9 +19,10 @@ from sim_validate.datasets.card import card_text
 from sim_validate.datasets.columns import dataset_tables
 from sim_validate.datasets.config import SPLITS, DatasetConfig
 from sim_validate.datasets.given_grasps import given_text
+from sim_validate.datasets.hand_files import joint_names, kept_hand
 from sim_validate.datasets.layout import CARD, CONFIG, DATA, FILE_FOLDERS, GIVEN_CONTACTS
 from sim_validate.datasets.manifest import Listed, Manifest, listed, write_manifest
-from sim_validate.datasets.parquet import joined, write_files
+from sim_validate.datasets.parquet import Tables, joined, write_files
 from sim_validate.datasets.quarantine import TWIN, QuarantinedUnit, quarantine_text
 from sim_validate.datasets.resuming import OTHER_FILES, Staging, UnitRecord
 from sim_validate.datasets.work_units import WorkUnit, provenance, units_sha256
@@ -30,13 +31,17 @@ Finished: TypeAlias = tuple[WorkUnit, UnitRecord]
 
 
 def write_rows(
-    folder: Path, config: DatasetConfig, units: Sequence[WorkUnit], staging: Staging
+    folder: Path, config: DatasetConfig, units: Sequence[WorkUnit], staging: Staging,
+    hand: Path | None,
 ) -> Manifest:  # fmt: skip
     """Write the rows and files of all units, and list what is there."""
     for name in (DATA, *FILE_FOLDERS):
         shutil.rmtree(folder / name, ignore_errors=True)
     good, quarantined = _sorted_out(units, staging)
-    tables = _write_tables(config, good, staging, folder)
+    joints = joint_names(hand)
+    groups = config.groups(len(joints))
+    about = {"schema": str(Manifest.SCHEMA), "config_sha256": config.sha256}
+    tables = _write_tables(dataset_tables(groups, joints), about, good, staging, folder)
     for unit, _ in good:
         shutil.copytree(staging.of(unit) / OTHER_FILES, folder, dirs_exist_ok=True)
     others = [
@@ -44,6 +49,7 @@ def write_rows(
         write_text(folder / QUARANTINE, quarantine_text(quarantined)),
         *_write_given(folder, units),
         *(path for name in FILE_FOLDERS for path in sorted((folder / name).glob("*"))),
+        *([] if hand is None else sorted(hand.iterdir())),
     ]
     return Manifest(
         config_sha256=config.sha256,
@@ -52,7 +58,7 @@ def write_rows(
         units=len(units),
         units_sha256=units_sha256(units),
         quarantined=len(quarantined),
-        groups=config.groups,
+        groups=groups,
         files=(*tables, *(listed(folder, path) for path in others)),
     )
 
@@ -63,9 +69,12 @@ def _write_given(folder: Path, units: Sequence[WorkUnit]) -> list[Path]:
     return [write_text(folder / GIVEN_CONTACTS, given_text(in_order))] if given else []
 
 
-def write_card_and_manifest(folder: Path, config: DatasetConfig, rows: Manifest) -> None:
+def write_card_and_manifest(
+    folder: Path, config: DatasetConfig, rows: Manifest, hand: Path | None
+) -> None:
     """Write the README.md of a dataset, and then the manifest, which marks it as finished."""
-    card = write_text(folder / CARD, card_text(config, rows))
+    known = None if hand is None else kept_hand(hand)
+    card = write_text(folder / CARD, card_text(config, rows, known))
     write_manifest(folder, replace(rows, files=(*rows.files, listed(folder, card))))
 
 
@@ -92,10 +101,13 @@ def _sorted_out(
 
 
 def _write_tables(
-    config: DatasetConfig, good: Sequence[Finished], staging: Staging, folder: Path
+    tables: Tables,
+    about: Mapping[str, str],
+    good: Sequence[Finished],
+    staging: Staging,
+    folder: Path,
 ) -> list[Listed]:
-    tables, found = dataset_tables(config.groups), list[Listed]()
-    about = {"schema": str(Manifest.SCHEMA), "config_sha256": config.sha256}
+    found = list[Listed]()
     objects = groupby(good, key=lambda each: (each[1].object_id, each[1].split))
     units = [(split, [unit for unit, _ in same]) for (_, split), same in objects]
     for name, (split, _) in product(tables, SPLITS):

@@ -7,53 +7,52 @@ poses are written as records of DexGraspBench.
 import math
 import shlex
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import TypeAlias
 
 from grasp_core.by_value import counted
-from grasp_core.closure.contacts import contacts_sha256
-from grasp_core.errors import InputError, SolverError
 from grasp_core.figures import NONE, meanings, table
 from grasp_core.files.file_kinds import GRASPS, REACHES
 from grasp_core.files.records import RecordFile, record_of
-from grasp_core.hands.hand import Coupling, Hand, load_hand
-from grasp_core.hands.hand_motors import hand_payload
-from grasp_core.hands.reach import HandReach, reach_with, uncoupled
-from grasp_core.hands.settings import ReachSettings
+from grasp_core.hands.hand import Hand, load_hand
+from grasp_core.hands.reach import HandReach
 from grasp_core.messages import MILLI
 from grasp_core.names import HANDS
 from grasp_core.objects.polyhedron import Polyhedron, is_convex
 from grasp_core.planning.result import Plan
-from grasp_core.values import Grasp
 from scenes.hand_files.building import hand_from_file
 from sim_validate.commands.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.commands.exit_codes import Exit, FlagsError
-from sim_validate.engine.setup import Agenda
 from sim_validate.execution.verdict import ExecutedGrasp, held_controls_in_words, loss_in_words
 from sim_validate.files.output_folders import alone_in
 from sim_validate.files.result_files import AboutObject
 from sim_validate.files.results_folder import remove_results
 from sim_validate.hands import flags as hand_flags
 from sim_validate.hands.dexgraspbench import dex_record, write_dex_object, write_dex_record
-from sim_validate.hands.execute import executed_by_hand, hand_execution_settings
-from sim_validate.hands.reaches import CarriedMass, ReachedGrasp, Reaches
-from sim_validate.hands.validate import MOST_PUSH_N, validate_hand
+from sim_validate.hands.reached_grasps import (
+    HandTask,
+    execution_with,
+    reached_grasp,
+    with_motors,
+)
+from sim_validate.hands.reaches import ReachedGrasp, Reaches
 from sim_validate.hands.verdict import HandVerdict
 from sim_validate.planning.asked_objects import asked_grasps
 from sim_validate.processes import workers
 from sim_validate.processes.compiling import REACHING, compile_loops, must_compile
-from sim_validate.settings import ExecutionSettings
 
-HAND_AGENDA = Agenda(critical_friction=False)
 Judge: TypeAlias = Callable[[Plan, Hand, Sequence[HandReach]], tuple[Exit, RecordFile]]
 """Judges a hand in its poses by another test; gives the exit code and its results."""
 
 
 def reach_file(command: hand_flags.Reach, reporter: Reporter, judge: Judge | None = None) -> int:
     """Look for a pose of a hand in each grasp of a file, and write what was found."""
-    hand = with_motors(asked_hand(command), command)
+    if command.protocol and not command.trials.simulate:
+        raise FlagsError(
+            "--protocol judges a hand in simulation: give --simulate too, or leave --protocol out"
+        )
+    hand = with_motors(asked_hand(command), command.trials, "given on the command line", flags=True)
     chosen = asked_grasps(
         command.grasps, reporter, grasp=command.grasp, friction=command.friction,
         limit=command.limit,
@@ -84,12 +83,10 @@ def reach_file(command: hand_flags.Reach, reporter: Reporter, judge: Judge | Non
 def _reach(command: hand_flags.Reach, hand: Hand, saved: Plan, reporter: Reporter) -> Reaches:
     if command.out is not None:
         remove_results(command.out, REACHES)
-    simulate = command.simulate and not command.protocol  # which simulate themselves
-    execution = None if command.mass_kg is None else hand_execution_settings(command.mass_kg)
-    work = partial(
-        reached_grasp, hand, saved.body, friction=saved.friction, asked=command.pose,
-        simulate=simulate, execution=execution,
-    )  # fmt: skip
+    simulate = command.trials.simulate and not command.protocol  # which simulate themselves
+    execution = execution_with(command.trials, saved.body)
+    task = HandTask(command.pose, simulate, execution)
+    work = partial(reached_grasp, hand, saved.body, friction=saved.friction, task=task)
     if saved.grasps and must_compile(REACHING, command.jobs):
         reporter.say("compiling inner loops once, which takes a minute or two")
         compile_loops(REACHING)
@@ -101,23 +98,6 @@ def _reach(command: hand_flags.Reach, hand: Hand, saved: Plan, reporter: Reporte
             Reaches, AboutObject.of(saved.body), saved.friction, hand, command.pose, settings
         ), command.out,
     )  # fmt: skip
-
-
-def reached_grasp(
-    hand: Hand, body: Polyhedron, grasp: Grasp, *, friction: float, asked: ReachSettings,
-    simulate: bool, execution: ExecutionSettings | None,
-) -> ReachedGrasp:  # fmt: skip
-    """Look for a pose in a grasp; there hold test wrenches and execute the grasp, if asked to."""
-    reach = reach_with(hand, body, grasp, friction, asked)
-    found = partial(ReachedGrasp, reach, contacts_sha256(grasp.contacts))
-    if not reach.reached:
-        return found()
-    held = executed = None
-    if simulate:
-        held = validate_hand(hand, body, reach, friction, agenda=HAND_AGENDA)
-    if execution is not None:
-        executed = executed_by_hand(hand, body, reach, friction, execution)
-    return found(carried(hand, body, reach, friction), held, executed)
 
 
 def _show(found: Reaches, reporter: Reporter) -> None:
@@ -146,35 +126,6 @@ def _show(found: Reaches, reporter: Reporter) -> None:
         )
     for each in (one.reach for one in shown if not one.reach.reached):
         reporter.warn(f"{each.grasp}: {each.reason}: {each.explanation}")
-
-
-def carried(hand: Hand, body: Polyhedron, reach: HandReach, friction: float) -> CarriedMass | None:
-    """Find the mass held in any orientation; None if the hand is not known well enough or weak."""
-    with suppress(InputError, SolverError):  # a figure beside the pose, which is there without it
-        found = hand_payload(hand, body, reach, friction, max_push_n=MOST_PUSH_N)
-        return CarriedMass(found.lower, found.upper, found.weakest)
-    return None
-
-
-def with_motors(hand: Hand, command: hand_flags.Reach) -> Hand:
-    """Return the hand with the torque limits that the command gives."""
-    if command.torque_limit_n_m is not None:
-        hand = hand.with_torque_limits(command.torque_limit_n_m, "given on the command line")
-    if command.protocol and not command.simulate:
-        raise FlagsError(
-            "--protocol judges a hand in simulation: give --simulate too, or leave --protocol out"
-        )
-    if command.simulate or command.mass_kg is not None:
-        asked = "--simulate" if command.simulate else "--mass-kg"
-        uncoupled(hand, asked)
-        missing = [joint.name for joint in hand.joints if joint.torque_limit_n_m is None]
-        if missing:
-            raise InputError(
-                f"{asked} needs a torque limit for each joint, but {hand.name} has none for "
-                f"{missing[0]}; give one for all joints with --torque-limit-n-m, or each in the "
-                "hand's file (actuatorfrcrange of its joint)"
-            )
-    return hand
 
 
 def show_simulated(verdicts: Sequence[HandVerdict], reporter: Reporter) -> None:
@@ -276,7 +227,9 @@ def show_hand(command: hand_flags.ShownHand, reporter: Reporter) -> int:
         listed = ", ".join(" and ".join(pair) for pair in hand.ignored_pairs)
         reporter.say(f"Links that may overlap, besides neighbours: {listed}.")
     if hand.couplings:
-        reporter.say(f"Joints that follow others: {', '.join(map(_follows, hand.couplings))}.")
+        reporter.say(
+            f"Joints that follow others: {', '.join(each.equation for each in hand.couplings)}."
+        )
     reporter.say(f"Torque limits: {hand.torque_source}.")
     reporter.say(_weight(hand))
     if all(joint.highest - joint.lowest < SMALL_RANGE for joint in hand.joints):
@@ -298,9 +251,3 @@ def _weight(hand: Hand) -> str:
         return "Masses of links: unknown; without them gravity does not load the motors."
     said = f"The links of the fingers weigh {1e3 * sum(stated):.3g} g together"
     return said + ("." if hand.name in HANDS else f"; {SHAPES_WEIGH}.")
-
-
-def _follows(coupling: Coupling) -> str:
-    said = f"{coupling.joint} = {coupling.ratio:g} {coupling.driver}"
-    offset = math.degrees(coupling.offset)
-    return f"{said} {'-' if offset < 0.0 else '+'} {abs(offset):.4g} deg" if offset else said

@@ -11,7 +11,7 @@ from functools import partial
 
 from grasp_core.allowed_values import instance
 from grasp_core.errors import InputError, NoForcesError
-from grasp_core.execution.grips import Grip, unsqueezed
+from grasp_core.execution.grips import STIFFNESS_N_PER_M, Grip, unsqueezed
 from grasp_core.execution.squeeze_certificate import BestSqueeze
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_motors import hand_grip
@@ -72,14 +72,19 @@ def execute_hand(
     return execution_of(holder, asked.for_body(body), threads=threads, enough=enough)
 
 
-def hand_execution_settings(mass_kg: float | None = None) -> ExecutionSettings:
+def hand_execution_settings(
+    mass_kg: float | None = None, density_kg_m3: float | None = None
+) -> ExecutionSettings:
     """Return the usual settings for hands, in which motors alone limit how hard fingers push.
 
     Args:
-        mass_kg: Mass of the object [kg]; None for that of water.
+        mass_kg: Mass of the object [kg]; None for that of its density.
+        density_kg_m3: Density of the object [kg/m^3]; None for that of water.
     """
     # a hand's fingers are as they are, however small the object is
-    return ExecutionSettings(mass_kg=mass_kg, push_n=MOST_PUSH_N, keep_defaults=True)
+    return ExecutionSettings(
+        mass_kg=mass_kg, density_kg_m3=density_kg_m3, push_n=MOST_PUSH_N, keep_defaults=True
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -107,10 +112,20 @@ class HandHolder(Holder):
         return held_hand_scene(self.hand, self.body, self.reach, best.grip, settings, near)
 
 
+def can_execute(hand: Hand, reach: HandReach) -> bool:
+    """Return whether motors carry the links, and fingertips can move in all directions."""
+    try:
+        finger_springs(strong_motors(hand, reach), STIFFNESS_N_PER_M)
+    except InputError:
+        return False
+    return True
+
+
 def executed_by_hand(
-    hand: Hand, body: Polyhedron, reach: HandReach, friction: float, settings: ExecutionSettings
-) -> ExecutedGrasp:
+    hand: Hand, body: Polyhedron, reach: HandReach, friction: float, settings: ExecutionSettings,
+    *, enough: bool = True,
+) -> ExecutedGrasp:  # fmt: skip
     """Execute one grasp with a hand; a grasp that cannot be executed is a result with a reason."""
-    execution = partial(execute_hand, hand, body, reach, friction, settings)
+    execution = partial(execute_hand, hand, body, reach, friction, settings, enough=enough)
     contacts = reach.contacts or ()
     return result_of(reach.grasp, "", contacts, execution, (InputError, NoForcesError))

@@ -9,7 +9,6 @@ from typing import Annotated
 
 from tyro.conf import Positional, UseAppendAction, arg
 
-from grasp_core.allowed_values import Quantity, TorqueLimit
 from grasp_core.declared import declared
 from grasp_core.hands.settings import ReachSettings
 from grasp_core.names import HANDS
@@ -23,7 +22,7 @@ from sim_validate.commands.flags import (
     Spoken,
 )
 from sim_validate.processes.workers import available_cores
-from sim_validate.settings import ProtocolName
+from sim_validate.settings import HandTrials, ProtocolName
 
 HandOrFile = Annotated[str, arg(help=f"The hand: {', '.join(HANDS)}, or an MJCF or URDF file.")]
 FingertipNames = Annotated[str, arg(metavar="NAME,NAME,...", help=(
@@ -49,14 +48,7 @@ class Reach(Spoken):
     fingertips: FingertipNames = ""
     grasp: GraspId = None
     pose: Annotated[ReachSettings, BARE] = field(default_factory=ReachSettings)
-    torque_limit_n_m: TorqueLimit | None = None
-    """Torque limit of every joint [N m], instead of those of the hand."""
-    simulate: bool = False
-    """Hold test wrenches in simulation with the hand's links and motors, and try negative controls;
-    every joint needs a torque limit."""
-    mass_kg: Quantity | None = None
-    """Mass of the object [kg], with which the hand also executes each grasp that it reaches, as
-    `execute` does with fingertips on springs; every joint needs a torque limit."""
+    trials: Annotated[HandTrials, BARE] = field(default_factory=HandTrials)
     protocol: UseAppendAction[tuple[ProtocolName, ...]] = ()
     """With --simulate: judge the hand by the published test of another tool, beside our verdict
     under its loads and the predicted margin, and write judgements.json; may be repeated."""

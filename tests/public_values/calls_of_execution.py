@@ -179,7 +179,9 @@ CALLS = [
     Call("sv.validate_hand", standing),
     Call("sv.execute_hand", standing, {"settings": optional(VALUE)},
          succeeds_in="tests/sim_validate/hands/test_execute.py"),
-    Call("sv.hand_execution_settings", dict, {"mass_kg": optional(POSITIVE)}),
+    Call("sv.hand_execution_settings", dict, {
+        "mass_kg": optional(POSITIVE), "density_kg_m3": optional(POSITIVE),
+    }),
     Call("gc.load_hand", lambda: {"name": "leap"}, {"name": WORD}),
     Call("gc.reach_with", reaching, {
         "settings": optional(VALUE),

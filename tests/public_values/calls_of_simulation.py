@@ -88,6 +88,9 @@ CALLS = [
     Call("sv.load_dataset", lambda: {"folder": "no/such/folder"}, {
         "folder": PATH | {"nowhere": "no/such/folder"}, "split": optional(WORD),
     }, succeeds_in="tests/sim_validate/datasets/test_loading.py"),
+    Call("sv.load_dataset_hand", lambda: {"folder": "no/such/folder"}, {
+        "folder": PATH | {"nowhere": "no/such/folder"},
+    }, succeeds_in="tests/sim_validate/datasets/test_hands.py"),
     reading("sv.load_regions", "no/such/file.npz", "tests/sim_validate/planning/test_regions.py"),
     reading("sv.load_executions", "no/such/executions.json",
             "tests/sim_validate/execution/test_executions.py"),

@@ -5,7 +5,7 @@ import shutil
 import pytest
 
 from sim_validate.datasets.build import build
-from tests.sim_validate.datasets.configs import CONFIG, LEARNED, build_small
+from tests.sim_validate.datasets.configs import CONFIG, LEARNED, build_small, with_gripper
 from tests.sim_validate.datasets.engines import Here, silent
 
 
@@ -34,6 +34,22 @@ def learned(tmp_path_factory):
     pytest.importorskip("pyarrow")
     folder = tmp_path_factory.mktemp("learned") / "ds"
     built = build(LEARNED, folder, Here(), silent)
+    assert (built.manifest.units, built.manifest.quarantined) == (2, 0)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def gripping(tmp_path_factory):
+    """Settings with a gripper, beside whose file there is nothing but its shape."""
+    return with_gripper(tmp_path_factory.mktemp("gripper"))
+
+
+@pytest.fixture(scope="session")
+def handed(gripping, tmp_path_factory):
+    """The dataset with the gripper, only to be read."""
+    pytest.importorskip("pyarrow")
+    folder = tmp_path_factory.mktemp("handed") / "ds"
+    built = build(gripping, folder, Here(), silent)
     assert (built.manifest.units, built.manifest.quarantined) == (2, 0)
     return folder
 

@@ -56,6 +56,11 @@ def test_every_engine_makes_the_same_bytes(engine, dataset, tmp_path):
     assert contents(tmp_path / "ds") == contents(dataset)
 
 
+def test_every_engine_makes_the_same_bytes_of_a_hand(engine, gripping, handed, tmp_path):
+    assert build(gripping, tmp_path / "ds", engine, silent, TIMEOUT_S).made == 2
+    assert contents(tmp_path / "ds") == contents(handed)
+
+
 def reasons(engine, objects, timeout_s, folder):
     """Do a unit of each object: why each was given up, None where it was done."""
     config = DatasetConfig(objects=objects, families=("concurrent",), limit=1)

@@ -12,7 +12,7 @@ import sim_validate as sv
 from grasp_core.files.records import record_of
 from sim_validate.commands.exit_codes import Exit
 from sim_validate.datasets.build import build
-from sim_validate.datasets.config import DatasetConfig, Learning
+from sim_validate.datasets.config import DatasetConfig, DatasetHand, Learning
 from sim_validate.datasets.isaac import export
 from sim_validate.datasets.open_dataset import select
 from sim_validate.main import main
@@ -31,7 +31,7 @@ def handed(tmp_path_factory):
     """Poses of LEAP in grasps of three objects in two splits; in one it cannot open."""
     config = DatasetConfig(
         objects=("wedge", "l-bracket", "prism"), families=("concurrent",), limit=2, seed=6,
-        learning=Learning(hand="leap", synthetic=1, friction_above=1),
+        learning=Learning(synthetic=1, friction_above=1), hand=DatasetHand(hand="leap"),
     )  # fmt: skip
     folder = tmp_path_factory.mktemp("handed") / "ds"
     assert build(config, folder, Here(), silent).manifest.quarantined == 0
@@ -74,7 +74,7 @@ def test_the_hand_touches_where_the_tables_say(handed, tmp_path):
         for name, grasp in grasps.items():
             row = rows.pop(name)
             assert row["object_id"].startswith(path.name[:16])
-            assert grasp.confidence == float(row["held"])
+            assert grasp.confidence == 0.5  # the hand was not simulated
             assert [*grasp.joints] == [joint["name"] for joint in joints]
             assert [*grasp.joints.values()] == row["hand_joints_rad"].tolist()
             assert [*grasp.open_joints.values()] == row["hand_open_joints_rad"].tolist()
@@ -108,7 +108,7 @@ def test_grasps_that_slipped_or_never_open_are_told_apart(copy, tmp_path):
     assert before["never_opens"] >= 1
     forged(copy, "grasps", first(
         lambda row: row["label"] == "grasp" and row["hand_open_joints_rad"],
-        held=False, outcome="slipped",
+        hand_held=False,
     ))  # fmt: skip
     export(copy, tmp_path / "slipped", None, silent)
     said = [

@@ -150,7 +150,7 @@ def test_a_hand_stands_where_its_joints_say(grasps):
         ({"hand_normals": [[0.0, 0.0, 1.0]] * 4}, "hand_normals not its normals there"),
         ({"hand_fingers": [0, 1, 2, 7]}, "not 4 of the hand's 4"),
         ({"hand_reached": False}, "hand_reason is '', but hand_reached is False"),
-        ({"hand_approach": [0.0, 0.0, 2.0]}, "hand_approach is not of unit length"),
+        ({"hand_approach": [0.0, 0.0, 2.0]}, "hand_approach must have length 1"),
         ({"hand_points_m": [[0.0] * 3] * 4}, "hand_points_m are not proved to be in force closure"),
     ],
 )
