@@ -18,9 +18,9 @@ from grasp_core.provenance import versions
 from scenes.drawing.painting import Camera
 from scenes.drawing.pictures import AZIMUTH_DEG, OBJECT_ELEVATION_DEG
 from scenes.example_objects import example_object
-from scenes.settings import EXPORT_ENDINGS, GraspFormat
 from sim_validate.commands.exit_codes import Exit
 from sim_validate.commands.flags import CLIP_TYPES, PAGE_TYPES, PICTURE_TYPES
+from sim_validate.commands.simulation_flags import WRITTEN_ENDINGS
 from sim_validate.commands.table import EXAMPLES, GROUPS
 from sim_validate.datasets.config import BuiltInHand
 from sim_validate.engine.held_or_let_go import HoldVerdict, Outcome
@@ -329,8 +329,8 @@ def test_help_on_a_command_shows_examples_that_can_be_typed(asked, capsys, words
         ("view", "--page", PAGE_TYPES), ("view", "--clip", CLIP_TYPES),
         ("transfer", "part,", MESH_FORMATS),
         ("hand", "STR", HANDS), ("reach", "--hand", HANDS),
-        ("export", "--to", get_args(GraspFormat)),
-        ("export", "--out", [ends[0] for ends in EXPORT_ENDINGS.values()]),
+        ("export", "--to", WRITTEN_ENDINGS),
+        ("export", "--out", [ends[0] for ends in WRITTEN_ENDINGS.values()]),
     ],
 )  # fmt: skip
 def test_the_help_of_a_flag_names_every_value(capsys, words, flag, values):

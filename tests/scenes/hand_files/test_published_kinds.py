@@ -292,6 +292,8 @@ def test_fingers_with_joints_in_common_move_as_one(tmp_path):
     assert [j.name for j in hand.fingers[1].links[0:1]] == ["arch"]
     (coupling,) = hand.couplings
     assert (coupling.joint, coupling.driver, coupling.ratio) == ("arch of t2", "arch", 1.0)
+    assert hand.file_joints[2:4] == ("arch", "ja1")
+    assert hand.file_joints[5:7] == ("arch", "ja2")
     assert sum(len(each.shapes) for each in hand.links) == 10
     assert sum(each.mass_kg for each in hand.links) == pytest.approx(7 * 0.02 + 3 * BALL_KG)
     check_places(hand, text)
