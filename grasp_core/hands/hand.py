@@ -312,6 +312,11 @@ def drives(names: Sequence[str], ranges: Array, couplings: Sequence[Coupling]) -
     return Drives(drivers, ratios, offsets, found)
 
 
+def name_of_copy(name: str, finger: str) -> str:
+    """Name a finger's copy of a link or joint that it has in common with a finger before it."""
+    return f"{name} of {finger}"
+
+
 @declared
 class Hand(Declared):
     """A palm with three to five fingers, and where its numbers come from."""
@@ -329,6 +334,8 @@ class Hand(Declared):
     """Joints that follow others."""
     notes: tuple[str, ...] = ()
     """How the hand differs from the file that it was read from, a sentence each."""
+    palm_link: str = PALM_NAME
+    """Name of the palm's link in the file that the hand was read from."""
 
     def _check_together(self) -> None:
         if not FEWEST_FINGERS <= len(self.fingers) <= MOST_FINGERS:
@@ -358,6 +365,13 @@ class Hand(Declared):
     def joints(self) -> tuple[Joint, ...]:
         """Return the joints in the order of `links`."""
         return tuple(link.joint for link in self.links)
+
+    @property
+    def file_joints(self) -> tuple[str, ...]:
+        """Return the name in the hand's file of each joint: a copy has that of its original."""
+        names = [joint.name for joint in self.joints]
+        copies = {name_of_copy(name, f.name): name for f in self.fingers for name in names}
+        return tuple(copies.get(name, name) for name in names)
 
     @property
     def chains(self) -> tuple[range, ...]:

@@ -27,6 +27,7 @@ from grasp_core.hands.hand import (
     Joint,
     Link,
     LinkShape,
+    name_of_copy,
 )
 from grasp_core.hands.hand_arrays import rotation_about
 from grasp_core.messages import shown
@@ -101,6 +102,7 @@ def _read(path: Path, fingertips: tuple[str, ...]) -> Hand:
                 (model.body_names[tip.body], *model.geom_names, *model.site_names)
             ]),
         ),
+        palm_link=model.body_names[found.palm] or PALM_NAME,
     )  # fmt: skip
     middle = overlapping_pairs(hand, 0.5 * hand.ranges.sum(axis=1))
     pairs = _excluded(model, found) | (middle & _close_by(hand, originals))
@@ -255,7 +257,7 @@ def own_chains(
             if link.name not in seen:
                 links.append(link)
                 continue
-            name, joint = (f"{each} of {finger.name}" for each in (link.name, link.joint.name))
+            name, joint = (name_of_copy(each, finger.name) for each in (link.name, link.joint.name))
             own = leaders.get(link.joint.name, Coupling(joint, link.joint.name, 1.0))
             added.append(replace(own, joint=joint))
             originals[name] = link.name

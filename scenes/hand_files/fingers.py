@@ -11,10 +11,10 @@ larger all around. The ball that stands for it lies in its box, at the end that 
 last joint.
 
 Rules that hold a joint at a linear function of another (`<mimic>` of URDF, `<equality><joint>` of
-MJCF) are followed to a joint that follows none. Of joints that move together one is the hand's free
-joint: that one, if it is on the way to a fingertip and has a motor or no other has; otherwise the
-first with a motor, or the first. Joints off the way to a fingertip count by their ranges. Other
-rules are refused.
+MJCF, `<equality><tendon>` of a sum of two joints) are followed to a joint that follows none. Of
+joints that move together one is the hand's free joint: that one, if it is on the way to a fingertip
+and has a motor or no other has; otherwise the first with a motor, or the first. Joints off the way
+to a fingertip count by their ranges. Other rules are refused.
 """
 
 import importlib

@@ -10,6 +10,7 @@ are given one that counts as none, as MuJoCo compiles no others.
 
 import math
 import warnings
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,8 +25,14 @@ NO_MASS_KG, NO_INERTIA_KG_M2 = 1e-12, 1e-14
 1e-15."""
 EVERY_BIT = 2**31 - 1
 """Bits of geoms that are made to collide with all others."""
+TIED = 2
+"""Number of joints that a tendon of a constant length ties to each other."""
 POWERS = 5
 """Coefficients of the polynomials that hold joints: the constant, and the powers one to four."""
+
+
+USUAL_HARDNESS = (0.02, 1.0), (0.9, 0.95, 0.001, 0.5, 2.0)
+"""The `solref` and `solimp` of a rule that states none."""
 
 
 class JointRule(NamedTuple):
@@ -35,7 +42,15 @@ class JointRule(NamedTuple):
     leader: int  # the other joint; -1 for a constant angle
     offset: float
     ratio: float
-    is_linear: bool = True  # False where the rule has further powers of the leader's angle
+    powers: tuple[float, ...] = ()
+    """Coefficients of the turn from the reference angle, by powers of the leader's, (5,)."""
+    hardness: tuple[tuple[float, ...], tuple[float, ...]] = USUAL_HARDNESS
+    """MJCF's `solref` and `solimp`."""
+
+    @property
+    def is_linear(self) -> bool:
+        """Whether there are no further powers of the leader's angle."""
+        return not any(self.powers[2:])
 
 
 class Tendon(NamedTuple):
@@ -43,6 +58,8 @@ class Tendon(NamedTuple):
 
     name: str
     joints: tuple[int, ...]  # joints of the sum; none for a cable
+    factors: tuple[float, ...]  # what their angles are multiplied with
+    motors: tuple[int, ...]  # the motors that pull it
     is_held: bool  # whether its length is a constant, or a function of another's
 
 
@@ -117,7 +134,7 @@ def compiled_hand(text: ModelText, *, lending: bool = True) -> HandModel:
         geom_kinds=tuple(mujoco.mjtGeom(int(kind)).name[7:].lower() for kind in model.geom_type),
         geom_rotations=turns.reshape(-1, 3, 3),
         geom_bits=bits,
-        joint_rules=_joint_rules(model),
+        joint_rules=(*_joint_rules(model), *_tendon_rules(model)),
         loops=_loops(model),
         tendons=_tendons(model),
         notes=(
@@ -217,16 +234,40 @@ def _replaced(spec: mujoco.MjSpec) -> list[str]:
     return found
 
 
-def _joint_rules(model: mujoco.MjModel) -> tuple[JointRule, ...]:
-    rules, start = list[JointRule](), model.qpos0[model.jnt_qposadr]
+def _joint_rules(model: mujoco.MjModel) -> Iterator[JointRule]:
     for i in _active(model, mujoco.mjtEq.mjEQ_JOINT):
-        joint, leader = int(model.eq_obj1id[i]), int(model.eq_obj2id[i])
-        constant, ratio, *others = model.eq_data[i, :POWERS].tolist()
-        if leader < 0:
-            ratio, others = 0.0, []
-        offset = float(start[joint]) + constant - ratio * float(start[leader])
-        rules.append(JointRule(joint, leader, offset, ratio, not any(others)))
-    return tuple(rules)
+        ends = int(model.eq_obj1id[i]), int(model.eq_obj2id[i])
+        yield _rule(model, i, *ends, model.eq_data[i, :POWERS])
+
+
+def _tendon_rules(model: mujoco.MjModel) -> Iterator[JointRule]:
+    """Yield a rule for each tendon of two joints whose length is held: c_1 q_1 + c_2 q_2 = l."""
+    for i in _active(model, mujoco.mjtEq.mjEQ_TENDON):
+        joints, factors = _sum_of(model, int(model.eq_obj1id[i]))
+        if len(joints) == TIED and model.eq_obj2id[i] < 0:
+            one, other = factors
+            powers = np.array([model.eq_data[i, 0] / one, -other / one, 0.0, 0.0, 0.0])
+            yield _rule(model, i, *joints, powers)
+
+
+def _rule(
+    model: mujoco.MjModel, equality: int, joint: int, leader: int, powers: Array
+) -> JointRule:
+    start = model.qpos0[model.jnt_qposadr]
+    constant, ratio = powers[:2].tolist()
+    if leader < 0:
+        ratio, powers = 0.0, powers * (1.0, 0.0, 0.0, 0.0, 0.0)
+    offset = float(start[joint]) + constant - ratio * float(start[leader])
+    hardness = tuple(model.eq_solref[equality].tolist()), tuple(model.eq_solimp[equality].tolist())
+    return JointRule(joint, leader, offset, ratio, tuple(powers.tolist()), hardness)
+
+
+def _sum_of(model: mujoco.MjModel, tendon: int) -> tuple[tuple[int, ...], tuple[float, ...]]:
+    """Return the joints of a tendon that is a sum of angles, and their factors; none of a cable."""
+    parts = slice(model.tendon_adr[tendon], model.tendon_adr[tendon] + model.tendon_num[tendon])
+    sums = model.wrap_type[parts] == mujoco.mjtWrap.mjWRAP_JOINT
+    joints, factors = model.wrap_objid[parts][sums], model.wrap_prm[parts][sums]
+    return tuple(joints.tolist()), tuple(factors.tolist())
 
 
 def _loops(model: mujoco.MjModel) -> tuple[tuple[str, int, int], ...]:
@@ -243,14 +284,16 @@ def _loops(model: mujoco.MjModel) -> tuple[tuple[str, int, int], ...]:
 
 def _tendons(model: mujoco.MjModel) -> tuple[Tendon, ...]:
     names = _names(model, mujoco.mjtObj.mjOBJ_TENDON, model.ntendon)
-    rules = _active(model, mujoco.mjtEq.mjEQ_TENDON)
-    held = {int(each[i]) for i in rules for each in (model.eq_obj1id, model.eq_obj2id)}
-    found = list[Tendon]()
+    held = dict[int, int]()  # and the other tendon, -1 for none
+    for i in _active(model, mujoco.mjtEq.mjEQ_TENDON):
+        one, other = int(model.eq_obj1id[i]), int(model.eq_obj2id[i])
+        held |= {one: other, other: one}
+    pulling, found = model.actuator_trntype == mujoco.mjtTrn.mjTRN_TENDON, list[Tendon]()
     for i, name in enumerate(names):
-        parts = slice(model.tendon_adr[i], model.tendon_adr[i] + model.tendon_num[i])
-        sums = model.wrap_type[parts] == mujoco.mjtWrap.mjWRAP_JOINT
-        joints = tuple(model.wrap_objid[parts][sums].tolist())
-        found.append(Tendon(name or f"tendon{i}", joints, i in held))
+        joints, factors = _sum_of(model, i)
+        motors = np.flatnonzero(pulling & (model.actuator_trnid[:, 0] == i)).tolist()
+        if not (held.get(i, 0) < 0 and len(joints) == TIED):  # else it is a rule of its joints
+            found.append(Tendon(name or f"tendon{i}", joints, factors, tuple(motors), i in held))
     return tuple(found)
 
 

@@ -62,8 +62,9 @@ THIN_M = 1e-6
 """Least half-size of a box, for shapes that are flat [m]."""
 ROOT, ROOT_TOLD = "root", "told"
 """Names of the body that a weld holds, and of the one that moves as told."""
-TIED = {"solref": (1e-3, 1.0), "solimp": (0.9999, 0.9999, 1e-3, 0.5, 1.0)}
-"""How hard joints follow others: as hard as MuJoCo allows, with a time constant of two steps."""
+TIED = {"solref": (1e-3, 0.5), "solimp": (0.9999, 0.9999, 1e-3, 0.5, 1.0)}
+"""How hard joints follow others: as hard as MuJoCo allows. It takes a time constant of two steps,
+with which half the critical damping brings a joint to its place in one step."""
 PAD_SLIDES = ("a", "b", "c")
 """Endings of the names of a pad's three slides."""
 

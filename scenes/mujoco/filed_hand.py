@@ -9,8 +9,8 @@ Of the shapes those are written that collide, without planes, fields of heights 
 What may meet what is as in the file, and every shape may meet the object. MuJoCo lets a link pass
 its neighbour, but not where the neighbour is at rest in the world; a hand moves as a whole, so its
 links pass the root's, too. Inertias, dampers, armatures, stops and couplings of joints are those of
-the file. A joint has one servo: that of the file, where it has one that goes to a position,
-otherwise a servo of a stated stiffness.
+the file. Rules that state no hardness are as hard as the simulator allows. What turns joints are
+servos (see `filed_servos`).
 """
 
 # pyright: basic, reportAttributeAccessIssue=false
@@ -18,18 +18,19 @@ otherwise a servo of a stated stiffness.
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.errors import InputError
+from grasp_core.quality.motors import Motors
 from scenes.hand_files.fingers import WORLD, joint_name, path_of_body
-from scenes.hand_files.model import POWERS, HandModel, mesh_points
-from scenes.mujoco.chains import LEAST_KG, ROOT_TOLD, Weld
+from scenes.hand_files.model import USUAL_HARDNESS, HandModel, JointRule, mesh_points
+from scenes.mujoco.chains import LEAST_KG, ROOT_TOLD, TIED, Weld
+from scenes.mujoco.filed_servos import SLIDE_LEVER_M, FiledServos, filed_servos
 from scenes.mujoco.mjcf_text import ORIGIN, Element, Parts, add_element, add_servo
-from scenes.silent_mujoco import mujoco
 
 ROOT_JOINT = re.compile(r"(?:.*[:/])?WRJ[TR][xyz]")
 """Names of joints that stand for the pose of a hand's root."""
@@ -37,48 +38,14 @@ OBJECT_BIT = 1 << 30
 """Bit of what only the object touches, whatever bits a hand's file uses."""
 OWN = "hand/{}"
 """Names of a hand's parts, which nothing else in a scene has."""
-SETTLES_S = 0.02
-"""Damping over stiffness of a servo where neither it nor its joint states one [s]: that of the
-hands of DexGraspBench."""
 LEAST_LEVER_M = 0.01
 """Least lever of links about joints that counts [m]."""
-SLIDE_LEVER_M = 0.05
-"""Lever with which a stiffness, a damping or an inertia that is stated for hinges is one of slides
-[m]: what fingertips so far from their hinges have."""
+BALANCED_N_M = 1e-6
+"""Torque by which joints that one motor pulls may be out of balance [N m]: less than any friction
+in them."""
 BARE_ROOT = {"pos": ORIGIN, "mass": 0.3, "diaginertia": (3e-4,) * 3}
 """Inertial of a root that hangs on a weld and has no mass in the file: about that of a palm."""
 NO_SOLIDS = {"plane", "hfield", "sdf"}
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class FiledServos:
-    """What drives the j joints of a hand: servos that go to an angle, with their limits.
-
-    Slides have metres and newtons in place of radians and newton metres.
-    """
-
-    stiffness: Array
-    """Stiffness of each servo, (j,) [N m/rad]."""
-    damping: Array
-    """Damping of each servo, without that of its joint, (j,) [N m s/rad]."""
-    limits: Array
-    """Largest torques, infinite for none, (j,) [N m]."""
-    spans: Array
-    """Least and largest angles that are told, infinite for none, (j, 2) [rad]."""
-    of_hinges: Array
-    """What is stated for hinges times this is that of a joint: 1 for a hinge, (j,)."""
-
-    def damped(self, inertia_kg_m2: float) -> "FiledServos":
-        """Return servos that do not overshoot with an inertia at each hinge."""
-        least = 2.0 * np.sqrt(self.stiffness * self.of_hinges * inertia_kg_m2)
-        return replace(self, damping=np.maximum(self.damping, least))
-
-    def alike(self, stiffness: float, damping: float) -> "FiledServos":
-        """Return servos of one stiffness of hinges, with no limits but those of the motors."""
-        return replace(
-            self, stiffness=stiffness * self.of_hinges, damping=damping * self.of_hinges,
-            spans=np.full_like(self.spans, np.inf) * (-1.0, 1.0),
-        )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -129,7 +96,7 @@ class FiledHand:
                         f"joint {joint_name(model, root)} must move the whole hand, but does not "
                         f"move {joint_name(model, joint)}; remove what is not the hand's"
                     )
-        servos = _servos(model, joints, stiffness_n_m_per_rad, own_servos)
+        servos = filed_servos(model, joints, stiffness_n_m_per_rad, own_servos=own_servos)
         return cls(model, tuple(joints), servos, rubbing, weld)
 
     @property
@@ -179,8 +146,8 @@ class FiledHand:
         found = {joint for joint in self.joints
                  if self.link_name(self.model.raw.jnt_bodyid[joint]) in links}  # fmt: skip
         for _ in self.joints:  # as long as a chain of couplings may be
-            found |= {joint for _, *ends in self._couplings if found.intersection(ends)
-                      for joint in ends if joint >= 0}  # fmt: skip
+            found |= {joint for rule in self.rules for joint in (rule.joint, rule.leader)
+                      if found.intersection((rule.joint, rule.leader)) and joint >= 0}  # fmt: skip
         return [place for place, joint in enumerate(self.joints) if joint in found]
 
     def link_name(self, body: int) -> str:
@@ -215,13 +182,67 @@ class FiledHand:
             self._add_shape(parts, bodies[int(raw.geom_bodyid[geom])], geom, contact)
         self._add_contact_rules(parts, contact)
         self._add_couplings(parts)
-        for place, name in enumerate(self.joint_names):
-            most, span = self.servos.limits[place], self.servos.spans[place]
+        self._add_servos(parts)
+
+    def _add_servos(self, parts: Parts) -> None:
+        servos = self.servos
+        for place, name in enumerate(servos.names):
+            most, span, pulled = servos.limits[place], servos.spans[place], servos.pulls[place]
+            if name not in self.joint_names:
+                tendon = add_element(parts["tendon"], "fixed", {"name": OWN.format(name)})
+                for joint in np.flatnonzero(pulled).tolist():
+                    named = OWN.format(self.joint_names[joint])
+                    add_element(tendon, "joint", {"joint": named, "coef": pulled[joint]})
             add_servo(
-                parts["actuator"], OWN.format(name), self.servos.stiffness[place],
-                self.servos.damping[place], (-most, most) if np.isfinite(most) else None,
+                parts["actuator"], OWN.format(name), servos.stiffness[place],
+                servos.damping[place], (-most, most) if np.isfinite(most) else None,
                 tuple(span.tolist()) if np.isfinite(span).all() else None,
+                pulls="joint" if name in self.joint_names else "tendon",
             )  # fmt: skip
+
+    def following(self, angles: Array) -> tuple[Array, Array]:
+        """Return the angles that obey the rules, (j,) [rad], and how they turn with free joints.
+
+        Takes angles (j,) of which those of the m free joints count. Gives derivatives, (j, m).
+        """
+        places = {joint: place for place, joint in enumerate(self.joints)}
+        waiting = {places[rule.joint]: rule for rule in self.rules}
+        obeyed, turning = angles.copy(), np.eye(len(angles))
+        turning[list(waiting)] = 0.0
+        start = self.model.raw.qpos0[self.model.raw.jnt_qposadr]
+        free = [place for place in places.values() if place not in waiting]
+        while waiting:
+            ready = [place for place, rule in waiting.items()
+                     if places.get(rule.leader, -1) not in waiting]  # fmt: skip
+            if not ready:  # a circle of rules, which the simulator solves as it can
+                break
+            for place in ready:
+                rule, powers = waiting[place], np.polynomial.Polynomial(waiting[place].powers)
+                leader = places.get(rule.leader)
+                turn = 0.0 if leader is None else obeyed[leader] - start[rule.leader]
+                obeyed[place] = start[rule.joint] + powers(turn)
+                if leader is not None:
+                    turning[place] = powers.deriv()(turn) * turning[leader]
+                del waiting[place]
+        return obeyed, turning[:, free]
+
+    def motors(self, levers: Array, angles: Array, unknown_n_m: float) -> Motors:
+        """Return what motors exert for contact forces: rows of levers (j, 3k), at angles (j,).
+
+        With the turns dq = R dy of joints and P of motors, R' L f = (P R)' F gives the motors'
+        torques F. Where a tendon turns joints that are free, what is left of it asks contact forces
+        for a balance between them, as a motor of no strength.
+        """
+        _, turning = self.following(angles)
+        carried, pulled = turning.T @ levers, (self.servos.pulls @ turning).T
+        limits = np.where(np.isfinite(self.servos.limits), self.servos.limits, unknown_n_m)
+        missing = len(pulled) - pulled.shape[1]
+        if missing == 0:
+            own: Array = np.asarray(np.linalg.solve(pulled, carried), dtype=np.float64)
+            return Motors(own, limits, np.zeros(len(limits)))
+        balances = np.linalg.svd(pulled)[0][:, pulled.shape[1] :].T
+        rows = np.vstack([np.linalg.pinv(pulled) @ carried, balances @ carried])
+        return Motors(rows, np.append(limits, np.full(missing, BALANCED_N_M)), np.zeros(len(rows)))
 
     @property
     def _moved(self) -> set[int]:
@@ -237,7 +258,9 @@ class FiledHand:
 
     def _joint(self, place: int) -> dict[str, object]:
         raw, joint = self.model.raw, self.joints[place]
-        dof, inertia = raw.jnt_dofadr[joint], self.armature_kg_m2 * self.servos.of_hinges[place]
+        slides = self.model.joint_kinds[joint] == "slide"
+        inertia = self.armature_kg_m2 * (SLIDE_LEVER_M**-2 if slides else 1.0)
+        dof = raw.jnt_dofadr[joint]
         limited = self.stops and bool(raw.jnt_limited[joint])
         return {
             "name": OWN.format(joint_name(self.model, joint)),
@@ -297,24 +320,25 @@ class FiledHand:
                 add_element(parts["contact"], "pair", named | contact)
 
     @property
-    def _couplings(self) -> list[tuple[int, int, int]]:
-        """Return each rule that couples joints, the joint, and that which it follows or -1."""
-        raw, kept = self.model.raw, {*self.joints, -1}
-        active = (raw.eq_type == mujoco.mjtEq.mjEQ_JOINT) & raw.eq_active0.astype(bool)
-        found = [(rule, int(raw.eq_obj1id[rule]), int(raw.eq_obj2id[rule]))
-                 for rule in np.flatnonzero(active).tolist()]  # fmt: skip
-        return [rule for rule in found if kept.issuperset(rule[1:])]
+    def rules(self) -> tuple[JointRule, ...]:
+        """Return the rules that hold joints at functions of others, or at an angle."""
+        kept = {*self.joints, -1}
+        return tuple(rule for rule in self.model.joint_rules
+                     if kept.issuperset((rule.joint, rule.leader)))  # fmt: skip
 
     def _add_couplings(self, parts: Parts) -> None:
         """Add which joints follow others, or stand at an angle."""
-        raw = self.model.raw
-        for rule, *ends in self._couplings:
-            named = {f"joint{place}": OWN.format(joint_name(self.model, joint))
-                     for place, joint in enumerate(ends, 1) if joint >= 0}  # fmt: skip
-            add_element(parts["equality"], "joint", named | {
-                "polycoef": raw.eq_data[rule, :POWERS],
-                "solref": raw.eq_solref[rule], "solimp": raw.eq_solimp[rule],
-            })  # fmt: skip
+        for rule in self.rules:
+            named = {
+                f"joint{place}": OWN.format(joint_name(self.model, joint))
+                for place, joint in enumerate((rule.joint, rule.leader), 1)
+                if joint >= 0
+            }
+            solref, solimp = rule.hardness
+            hard = {"solref": solref, "solimp": solimp}
+            if rule.hardness == USUAL_HARDNESS:  # the file states none
+                hard = TIED
+            add_element(parts["equality"], "joint", named | {"polycoef": rule.powers} | hard)
 
 
 def _hull(model: HandModel, geom: int) -> Array:
@@ -322,28 +346,3 @@ def _hull(model: HandModel, geom: int) -> Array:
     raw, mesh = model.raw, model.raw.geom_dataid[geom]
     graph = raw.mesh_graph[raw.mesh_graphadr[mesh] :]  # counts, then two numbers for each corner
     return mesh_points(model, geom)[graph[2 + graph[0] : 2 + 2 * graph[0]]]
-
-
-def _servos(
-    model: HandModel, joints: Sequence[int], stiffness: float, own_servos: bool
-) -> FiledServos:
-    raw, count, torques = model.raw, len(joints), model.torques[list(joints)]
-    slides = [model.joint_kinds[joint] == "slide" for joint in joints]
-    of_hinges = np.where(slides, SLIDE_LEVER_M**-2, 1.0)
-    stiffnesses, dampings = stiffness * of_hinges, np.zeros(count)
-    spans = np.tile([-np.inf, np.inf], (count, 1))
-    for i in range(raw.nu if own_servos else 0):
-        gear, gain, bias = raw.actuator_gear[i, 0], raw.actuator_gainprm[i], raw.actuator_biasprm[i]
-        joint, kind = int(raw.actuator_trnid[i, 0]), raw.actuator_trntype[i]
-        affine = raw.actuator_biastype[i] == mujoco.mjtBias.mjBIAS_AFFINE
-        goes_to_angle = affine and gain[0] > 0.0 and bias[0] == 0.0 and bias[1] == -gain[0]
-        turns_joint = kind == mujoco.mjtTrn.mjTRN_JOINT and gear != 0.0 and joint in joints
-        if goes_to_angle and turns_joint:
-            place = joints.index(joint)  # force and length are both times the gear
-            stiffnesses[place], dampings[place] = gear**2 * gain[0], -(gear**2) * bias[2]
-            if raw.actuator_ctrllimited[i]:
-                spans[place] = np.sort(raw.actuator_ctrlrange[i] / gear)
-    own = raw.dof_damping[raw.jnt_dofadr[list(joints)]].reshape(count, -1)[:, 0]
-    dampings = np.where(dampings + own <= 0.0, SETTLES_S * stiffnesses, dampings)
-    limits = np.where(np.isnan(torques), np.inf, torques)
-    return FiledServos(stiffnesses, dampings, limits, spans, of_hinges)

@@ -15,6 +15,8 @@ from scenes.mujoco.mjcf_text import (
 )
 from scenes.mujoco.published_tests import HandServos, is_covered
 
+SECTIONS = ("asset", "worldbody", "equality", "contact", "actuator")
+
 
 def text_of_hand(hand: Hand, servos: HandServos) -> ModelText:
     """Write a hand as MJCF; the palm has the pose in its world that it has in its root."""
@@ -28,7 +30,7 @@ def text_of_hand(hand: Hand, servos: HandServos) -> ModelText:
         damping_n_m_s_per_rad=servos.least_damping_n_m_s_per_rad, stops=True,
         inertials={**hand_inertials(hand), **servos.inertials},
     )  # fmt: skip
-    parts = {tag: element(tag, {}) for tag in ("asset", "worldbody", "contact", "actuator")}
+    parts = {tag: element(tag, {}) for tag in SECTIONS}
     chains.add_to(parts, parts["worldbody"], [{"conaffinity": FINGERTIP_BIT}] * len(used), {})
     root = element("mujoco", {"model": printable(hand.name)})
     add_element(root, "compiler", COMPILER)

@@ -114,12 +114,14 @@ def placed(position: Array, rotation: Array) -> dict[str, object]:
 def add_servo(
     actuators: Element, joint: str, stiffness: float, damping: float,
     limits: tuple[float, float] | None = None, span: tuple[float, float] | None = None,
+    pulls: str = "joint",
 ) -> None:  # fmt: skip
     """Add a servo with kp and kv [N/m and N s/m, or N m/rad and N m s/rad].
 
-    Its force [N or N m] and its command [m or rad] may have limits.
+    Its force [N or N m] and its command [m or rad] may have limits. It turns a joint, or pulls a
+    tendon.
     """
-    servo: dict[str, object] = {"name": joint, "joint": joint, "kp": stiffness, "kv": damping}
+    servo: dict[str, object] = {"name": joint, pulls: joint, "kp": stiffness, "kv": damping}
     servo["ctrllimited"] = "false" if span is None else "true"
     servo["forcelimited"] = "false" if limits is None else "true"
     servo |= {} if span is None else {"ctrlrange": span}

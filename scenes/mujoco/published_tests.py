@@ -181,7 +181,7 @@ class TestedObject:
         none = np.zeros(count + (0 if hand.weld is None else POSE_NUMBERS))
         return self._held(
             hand, [], pushes_n=np.zeros(0), opened=none, shut=none, squeezing=none,
-            fingers=hand.fingers,
+            fingers=hand.fingers, driven=hand.servos.pulls,
         )  # fmt: skip
 
     def postures(self, hand: Hand, reach: HandReach, stiffness_n_m_per_rad: float) -> Postures:
@@ -215,7 +215,7 @@ class TestedObject:
         )
         rubbing, opened = physics.rubbing(self.friction), told["opened"]
         pose = POSE_NUMBERS if isinstance(holder, HandChains) and holder.weld is not None else 0
-        driven = told.get("driven")
+        driven = None if isinstance(holder, FiledHand) else told.get("driven")
         begun = opened[pose:] if driven is None else driven @ opened[pose:]
         key = {"qpos": np.concatenate([IDENTITY_POSE, opened]), "ctrl": begun}
         moved = {"mpos": opened[:3], "mquat": opened[3:7]} if pose else {}

@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from scenes.mujoco.chains import HandChains
     from scenes.mujoco.filed_hand import FiledHand
 
-SCENE_SECTIONS = ("asset", "worldbody", "equality", "contact", "actuator", "keyframe")
+SCENE_SECTIONS = ("asset", "worldbody", "tendon", "equality", "contact", "actuator", "keyframe")
 FLAGS_OF_EXACT = {"midphase": "disable", "island": "disable"}
 """Flags of scenes in which fingertips touch the object's own surface. MuJoCo's search for pairs
 within two bodies misses contacts that are less deep than a ten-thousandth of the object, as all are

@@ -5,10 +5,11 @@ this. This module imports nothing that is slow to load, so that help and usage e
 once.
 """
 
+from collections.abc import Mapping
 from dataclasses import field
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal, TypeAlias
 
 from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 
@@ -37,6 +38,10 @@ from sim_validate.settings import (
     ProtocolName,
 )
 
+WrittenFormat: TypeAlias = GraspFormat | Literal["isaac"]
+WRITTEN_ENDINGS: Mapping[WrittenFormat, tuple[str, ...]] = {
+    **EXPORT_ENDINGS, "isaac": (".yaml", ".yml"),
+}  # fmt: skip
 RUN_LIMIT = 100
 """Number of grasps that `run` simulates by default, which takes some ten seconds."""
 
@@ -135,10 +140,11 @@ class ExportFlags(Spoken):
     grasps: Positional[GraspsPath]
     out: Annotated[Path, arg(aliases=("-o",), help=(
         "File to write, which ends in "
-        f"{', '.join(f'{ends[0]} for {name}' for name, ends in EXPORT_ENDINGS.items())}."
+        f"{', '.join(f'{ends[0]} for {name}' for name, ends in WRITTEN_ENDINGS.items())}."
     ))]  # fmt: skip
-    to: GraspFormat = "gltf"
-    """Format to write: gltf, a binary glTF scene (see docs/files.md)."""
+    to: WrittenFormat = "gltf"
+    """Format to write: gltf, a binary glTF scene, or isaac, an Isaac grasp file of the hand whose
+    poses `graspproof reach --out` has written beside the grasps (see docs/files.md)."""
     grasp: GraspId = None
     limit: FirstOnly = None
     fingertip_radius_m: Quantity | None = None

@@ -42,8 +42,8 @@ COMMANDS: Mapping[str, Command] = {
         "held under gravity, as in the command `execute`.",
     ),
     "export": Command(
-        "commands.simulation_flags:ExportFlags", "execution.command:export_grasps",
-        "Write grasps as a scene for viewers and editors of 3D scenes.",
+        "commands.simulation_flags:ExportFlags", "report.command:export_grasps",
+        "Write grasps for other programs: as a 3D scene, or a hand in them for Isaac.",
     ),
     "view": Command(
         "commands.flags:ViewFlags", "report.command:view_grasp",
@@ -95,6 +95,10 @@ COMMANDS: Mapping[str, Command] = {
         "Check files and rows of a dataset, prove force closure again, and redo a sample; or check "
         "the judgements of records.",
     ),
+    "dataset export": Command(
+        "datasets.flags:ExportFlags", "datasets.command:export_dataset",
+        "Write the poses of a dataset's hand for Isaac, a file for each object.",
+    ),
     "baseline record": Command(
         "baselines.flags:RecordFlags", "baselines.command:record_baseline",
         "Simulate grasps and write a baseline: a file that records how stable each grasp is.",
@@ -121,7 +125,7 @@ COMMANDS: Mapping[str, Command] = {
     ),
 }  # fmt: skip
 GROUPS: Mapping[str, str] = {
-    "dataset": "Build a dataset of grasps of many objects; check datasets.",
+    "dataset": "Build a dataset of grasps of many objects; check or export datasets.",
     "baseline": (
         "Record simulation results of grasps, and notice later when their stability changes."
     ),
@@ -143,6 +147,7 @@ scene plan/grasps.json --out scenes
 scene plan/grasps.json --grasp c-0-1-2-7
 scene plan/grasps.json --mass-kg 0.3 --out held
 export plan/grasps.json -o grasps.glb
+export reached/grasps.json --to isaac -o grasps.yaml
 regions plan/grasps.json --out plan
 regions plan/grasps.json --reserve 0.1 --recenter --limit 5 --out smaller
 replay graspproof-out/wedge --grasp c-0-1-2-7 --out replay
@@ -176,6 +181,7 @@ dataset build ds/config.toml --out again
 dataset import contacts.json mug.obj --out judged
 dataset verify ds
 dataset verify judged
+dataset export ds --out isaac
 baseline record grasps.json -o wedge.baseline.json
 baseline check wedge.baseline.json --strict
 """.splitlines()

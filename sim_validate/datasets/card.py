@@ -18,10 +18,10 @@ from sim_validate.datasets.config import (
     REFERENCES,
     SPLITS,
     DatasetConfig,
-    quoted,
     settings_text,
 )
 from sim_validate.datasets.manifest import Manifest
+from sim_validate.files.toml_files import quoted
 
 HUB_SIZES = ("1K", "10K", "100K", "1M", "10M", "100M", "1B", "10B", "100B")
 """Powers of ten, from a thousand, as the Hugging Face Hub names sizes of datasets."""

@@ -1,4 +1,4 @@
-"""Runs the commands that build, import and verify datasets."""
+"""Runs the commands that build, import, verify and export datasets."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -23,6 +23,7 @@ from sim_validate.datasets.config import (
     PlannedContent,
     config_from_toml,
 )
+from sim_validate.datasets.isaac import export
 from sim_validate.datasets.layout import CARD, CONFIG
 from sim_validate.datasets.open_dataset import splits_in_words
 from sim_validate.datasets.verify import verify
@@ -102,6 +103,22 @@ def tell_faults(folder: Path, faults: Sequence[str], reporter: Reporter) -> int:
     reporter.say(f"{folder}: {'nothing is wrong' if not faults else f'faults: {len(faults)}'}")
     reporter.document({"dataset": str(folder), "faults": [*faults]})
     return Exit.NEGATIVE if faults else Exit.GOOD
+
+
+def export_dataset(command: dataset_flags.ExportFlags, reporter: Reporter) -> int:
+    """Write the poses of a dataset's hand as Isaac grasp files."""
+    with reporter.progress("exporting") as steps:
+        done = export(command.dataset, command.out, command.split, steps.update)
+    grasps, objects = counted(done["grasps"], "grasp"), counted(done["objects"], "object")
+    reporter.say(f"{command.out}: {grasps} of {objects}, a file for each object")
+    if closed := done["never_opens"]:
+        reporter.say(f"left out, as the hand cannot open its fingers: {counted(closed, 'grasp')}")
+    if not done["grasps"]:
+        where = f"the split {command.split}" if command.split else "the dataset"
+        reporter.warn(f"{command.dataset}: {where} has no grasp that the hand reaches and opens in")
+    asked = {"dataset": str(command.dataset), "split": command.split, "out": str(command.out)}
+    reporter.document({**asked, **done})
+    return Exit.GOOD
 
 
 def _warn(config: DatasetConfig, reporter: Reporter) -> None:

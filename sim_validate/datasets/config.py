@@ -20,6 +20,7 @@ from grasp_core.mesh_files.limits import FaceKind, FileLengths
 from grasp_core.messages import shown
 from grasp_core.names import HANDS, METHODS, ConeKind, Method
 from grasp_core.settings import Settings, as_table
+from sim_validate.files.toml_files import quoted
 from sim_validate.settings import ExecutionSettings, HandTrials, LimitSearch
 
 TableName: TypeAlias = Literal["objects", "grasps", "trials", "executions"]
@@ -274,10 +275,3 @@ def _as_toml(value: object) -> str:
     if isinstance(value, str):
         return quoted(value)
     return repr(value)
-
-
-def quoted(text: str) -> str:
-    """Write a text as a basic string of TOML, printable and on one line; YAML reads it alike."""
-    plain = text.replace("\\", "\\\\").replace('"', '\\"')
-    letters = (c if c.isprintable() else f"\\U{ord(c):08x}" for c in plain)
-    return f'"{"".join(letters)}"'

@@ -10,7 +10,13 @@ from grasp_core.allowed_values import Count, Seed, Share
 from grasp_core.declared import declared
 from grasp_core.settings import Settings
 from sim_validate.commands.flags import BARE, Positive, Spoken
-from sim_validate.datasets.config import Content, DatasetHand, Learning, PlannedContent
+from sim_validate.datasets.config import (
+    Content,
+    DatasetHand,
+    Learning,
+    PlannedContent,
+    SplitName,
+)
 from sim_validate.processes.workers import available_cores
 
 
@@ -71,3 +77,15 @@ class VerifyFlags(Spoken):
     judgements all is checked, and nothing simulated again."""
     seed: Seed = 0
     """Seed of the random choice of the sample that is computed again."""
+
+
+@declared
+class ExportFlags(Spoken):
+    """Flags of the command `dataset export`."""
+
+    dataset: Positional[Path]
+    """Folder of the dataset, which was built with --hand."""
+    out: Path
+    """Folder for a file of each object; it must be empty or not exist."""
+    split: SplitName | None = None
+    """Export only the objects of this split; if not given, all objects."""

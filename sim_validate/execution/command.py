@@ -1,7 +1,6 @@
-"""Runs `execute`, which simulates grasps as a robot executes them, and writes grasps for others.
+"""Runs `execute`, which simulates grasps as a robot executes them, and `scene`.
 
-`scene` writes models for MuJoCo, with true masses if the flags ask for them, and `export` one file
-for other programs.
+`scene` writes models for MuJoCo, with true masses if the flags ask for them.
 """
 
 from collections import Counter
@@ -11,7 +10,6 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
-from grasp_core.by_value import counted
 from grasp_core.errors import InputError, NoForcesError
 from grasp_core.figures import NONE, figures
 from grasp_core.files.text_files import write_text
@@ -22,7 +20,6 @@ from grasp_core.planning.result import Plan
 from grasp_core.settings import extended
 from grasp_core.stopping import never
 from grasp_core.values import Grasp
-from scenes import exports
 from scenes.settings import ScaledScene
 from sim_validate.commands import simulation_flags
 from sim_validate.commands.console import TABLE_ROWS, Reporter, warn_of
@@ -270,21 +267,3 @@ def _held(
         return fingers.scene(settings, best).xml
 
     return text_of
-
-
-def export_grasps(command: simulation_flags.ExportFlags, reporter: Reporter) -> int:
-    """Write the grasps of a file as one file of another program's format."""
-    endings = exports.EXPORT_ENDINGS[command.to]
-    if command.out.suffix.lower() not in endings:
-        raise FlagsError(
-            f"--out must end in {' or '.join(endings)} with --to {command.to}, got {command.out}"
-        )
-    chosen = asked_grasps(command.grasps, reporter, grasp=command.grasp, limit=command.limit)
-    if chosen is None:
-        return Exit.NONE
-    radius = command.fingertip_radius_m
-    exports.export_grasps(chosen, command.out, command.to, fingertip_radius_m=radius)
-    reporter.say(f"wrote {command.out} with {counted(len(chosen), 'grasp')}")
-    ids = [grasp.id for grasp in chosen]
-    reporter.document({"to": command.to, "out": str(command.out), "grasps": ids})
-    return Exit.GOOD

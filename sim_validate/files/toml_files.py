@@ -1,4 +1,4 @@
-"""Reads tables of TOML files."""
+"""Reads tables of TOML files, and writes texts as strings of them."""
 
 import re
 import tomllib
@@ -60,3 +60,10 @@ def _check_no_dates(found: Any, where: str = "") -> None:
     elif isinstance(found, list):
         for place, each in enumerate(cast("list[Any]", found)):
             _check_no_dates(each, f"{where}[{place}]")
+
+
+def quoted(text: str) -> str:
+    """Write a text as a basic string of TOML, printable and on one line; YAML reads it alike."""
+    plain = text.replace("\\", "\\\\").replace('"', '\\"')
+    letters = (c if c.isprintable() else f"\\U{ord(c):08x}" for c in plain)
+    return f'"{"".join(letters)}"'

@@ -1,7 +1,7 @@
 """Finds the hand that records are about: a built-in one, or one of a file."""
 
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -35,9 +35,14 @@ class JudgedHand:
     """Hash of the text of its file as it was read, and of the files that this names."""
 
     @property
+    def filed(self) -> FiledHand:
+        """Return the hand as its file has it."""
+        return FiledHand.of(self.model, (1.0, 0.0, 0.0), self.servo_n_m_per_rad)
+
+    @property
     def about(self) -> AboutHand:
         """Say which hand this is."""
-        hand = FiledHand.of(self.model, (1.0, 0.0, 0.0), self.servo_n_m_per_rad)
+        hand = self.filed
         ranges = np.where(np.isfinite(hand.ranges), hand.ranges, np.nan)
         return AboutHand(self.name, self.sha256, hand.joint_names, ranges, self.notes)
 
@@ -68,10 +73,12 @@ def judged_hand(given: str | Path) -> JudgedHand:
         read = model_text(path)
         model = compiled_hand(read, lending=False)
         _refuse_ties(model)
-    tendons = [tendon.name for tendon in model.tendons]
-    notes = note("tendons are left out, as if joints had motors of their own", tendons)
-    said = (*read.notes, *model.notes, *notes)
-    return JudgedHand(path.stem, model, USUAL_SERVO_N_M_PER_RAD, said, _sha256(read))
+        said = (*read.notes, *model.notes)
+        found = JudgedHand(path.stem, model, USUAL_SERVO_N_M_PER_RAD, said, _sha256(read))
+        servos = found.filed.servos.names
+    aside = [tendon.name for tendon in model.tendons if tendon.name not in servos]
+    notes = note("tendons are left out: no motor pulls them, or joints have motors, too", aside)
+    return replace(found, notes=(*said, *notes))
 
 
 def _sha256(text: ModelText) -> str:
@@ -91,6 +98,10 @@ def _refuse_ties(model: HandModel) -> None:
     ties += [
         f"joints are coupled by the length of tendon {tendon.name}"
         for tendon in model.tendons if tendon.is_held
+    ]  # fmt: skip
+    ties += [
+        f"a motor pulls tendon {tendon.name}, which is a cable"
+        for tendon in model.tendons if tendon.motors and not tendon.joints
     ]  # fmt: skip
     if ties:
         raise InputError(

@@ -9,8 +9,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
-import numpy as np
-
 from grasp_core.arrays import Array
 from grasp_core.closure.closure_certificate import ClosureCertificate
 from grasp_core.closure.critical_friction import critical_friction
@@ -73,18 +71,13 @@ class Stage:
     def trials(self) -> HandTrials:
         """Runs our own trials, with a simulator that is right about a known grasp."""
         settings = self.settings
-        checked(KnownGrasp.of(settings.setup, settings.friction))
+        coupled = bool(self.filed.rules)
+        checked(KnownGrasp.of(settings.setup, settings.friction, coupled=coupled))
         weight_n = settings.mass_kg * GRAVITY_M_PER_S2
         tested = self._tested(settings.friction, settings.mass_kg)
         return HandTrials(
             self.hand.model, tested, settings.setup, self.hand.servo_n_m_per_rad, weight_n
         )
-
-    @property
-    def limits(self) -> Array:
-        """Return the largest torque of each motor, as good as none where none is known, (j,)."""
-        known = self.filed.servos.limits
-        return np.where(np.isfinite(known), known, STRONG_N_M)
 
     def _tested(self, friction: float, mass_kg: float) -> TestedObject:
         physics = self.settings.setup.physics
@@ -200,7 +193,7 @@ def _judgement(
     trial: HandTrial | None, stage: Stage,
 ) -> RecordJudgement:  # fmt: skip
     proof, stood = looked.proof, looked.stood
-    motors = Motors(looked.levers, stage.limits, np.zeros(len(stage.limits)))
+    motors = stage.filed.motors(looked.levers, looked.at.grasp[1], STRONG_N_M)
     return RecordJudgement(
         id=record.id, object=record.object, scale=record.scale, hand=hand,
         proof=None if isinstance(proof, str) else proof,

@@ -17,14 +17,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from grasp_core.values import FINGERS
 from scenes.hand_files.model import compiled_hand
 from scenes.mujoco.hand_texts import text_of_hand
 from scenes.mujoco.published_tests import HandServos, TestedObject
 from sim_validate.engine.known_cases import GateCheck
 from sim_validate.hands.known_hand import (
     CUBE_HALF,
-    HINGE_HEIGHT,
     KNOWN_TORQUE,
+    SECOND_RATIO,
     KnownHand,
     cube,
     hinged_hand,
@@ -48,12 +49,13 @@ class KnownGrasp(KnownHand):
     def checks(self) -> tuple[GateCheck, ...]:
         """Measure what the hand resists, over the exact figures."""
         servos = HandServos()
-        model = compiled_hand(text_of_hand(hinged_hand(), servos))
+        model = compiled_hand(text_of_hand(hinged_hand(coupled=self.coupled), servos))
         tested = TestedObject(cube(), self.friction, 0.0, self.setup.physics)
         trials = HandTrials(model, tested, self.setup, servos.stiffness_n_m_per_rad, 0.0)
-        push = min(trials.push_n, KNOWN_TORQUE / HINGE_HEIGHT)
-        squeeze = GENTLE * push * HINGE_HEIGHT / servos.stiffness_n_m_per_rad
-        postures = np.array([np.full(4, angle) for angle in (-OPENED_RAD, 0.0, squeeze)])
+        push = min(trials.push_n, KNOWN_TORQUE / self.lever_m)
+        squeeze = GENTLE * push * self.lever_m / servos.stiffness_n_m_per_rad
+        turns = np.tile([1.0, SECOND_RATIO] if self.coupled else [1.0], FINGERS)
+        postures = np.outer([-OPENED_RAD, 0.0, squeeze], turns)
         at = Placed(np.tile(np.eye(4), (3, 1, 1)), postures, np.eye(3))
         held = ClosedHand(trials, at, trials.closed(at))
         exact = {
@@ -62,7 +64,7 @@ class KnownGrasp(KnownHand):
             "against one finger": (np.eye(6)[0], (1.0 + 2.0 * self.friction) * push),
         }
         wrenches = np.array([wrench for wrench, _ in exact.values()])
-        limits = held.limits(wrenches) if len(held.contacts) == len(postures[0]) else ()
+        limits = held.limits(wrenches) if len(held.contacts) == FINGERS else ()
         found = list[GateCheck]()
         for place, (name, (_, right)) in enumerate(exact.items()):
             predicted, at_share = math.nan, math.nan

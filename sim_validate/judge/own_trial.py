@@ -35,7 +35,6 @@ from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import InputError, SolverError, UndecidedError
 from grasp_core.messages import MILLI
-from grasp_core.quality.motors import Motors
 from grasp_core.quality.wrench_limits import WrenchLimit, axis_wrenches, wrench_limits
 from grasp_core.values import Contact
 from scenes.hand_files.model import HandModel
@@ -62,6 +61,8 @@ STRONG_N_M = 1e3
 """Torque limit of a motor where none is known [N m]: no limit matters."""
 GENTLE = 0.6
 """Largest normal force without a load, over the largest there is."""
+LEAST_SQUEEZE = 1e-3
+"""Largest force without a load, over the largest there is, with which a hand does not squeeze."""
 LESS_FRICTION, LEAST_FRICTION = 0.8, 1e-3
 """Friction of the control with less friction, over what its contacts need, and its least value."""
 FEWEST_CONTACTS = 2
@@ -71,7 +72,7 @@ UNDECIDED = (InputError, SolverError, UndecidedError)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trial:
-    """A wrench about the centre of mass, (6,), what joints are told, (j,) [rad], and friction."""
+    """A wrench about the centre of mass, (6,), what servos are told, (u,) [rad], and friction."""
 
     wrench: Array
     told: Array
@@ -104,8 +105,6 @@ class HandTrials:
         closing = scaled.by_filed_hand(soft)
         self.closing = Bench(closing, threads=threads, timeout_s=timeout_s)
         self.holding = Bench(scene, threads=threads, timeout_s=timeout_s)
-        known = self.hand.servos.limits
-        self.limits = np.where(np.isfinite(known), known, STRONG_N_M)
 
     def tried(self, at: Placed) -> HandTrial:
         """Let the hand close in the postures of a record, and hold what it should."""
@@ -123,6 +122,11 @@ class HandTrials:
             return lost.because(f"{len(held.contacts)} contacts are left when the hand has closed")
         try:
             proof = force_closure(held.contacts, friction=self.friction)
+            if proof.closed and held.is_limp:
+                return lost.because(
+                    "no forces of the closed hand balance each other: some of its joints are "
+                    "pulled by one motor together"
+                )
             return held.open_trial(proof, far) if not proof.closed else held.trial(proof, far)
         except UNDECIDED as error:
             return lost.because(f"when the hand has closed, {error}")
@@ -135,9 +139,10 @@ class HandTrials:
         way = np.concatenate([
             _way(begun, shut, close), _way(shut, squeezing, close), np.tile(squeezing, (rest, 1)),
         ])  # fmt: skip
+        angles, _ = self.hand.following(begun[POSE_NUMBERS:])
         told = Told(
-            np.zeros((len(way), 6)), way[:, POSE_NUMBERS:], mocap=way[:, :POSE_NUMBERS],
-            joints=np.concatenate([IDENTITY_POSE, begun[POSE_NUMBERS:]]),
+            np.zeros((len(way), 6)), way[:, POSE_NUMBERS:] @ self.hand.servos.pulls.T,
+            mocap=way[:, :POSE_NUMBERS], joints=np.concatenate([IDENTITY_POSE, angles]),
         )  # fmt: skip
         (motion,) = self.closing.simulated([told])
         return motion
@@ -172,9 +177,9 @@ class ClosedHand:
         self.found = found
         self.links = tuple(each.link for each in found)
         self.contacts: tuple[Contact, ...] = tuple(each.contact for each in found)
-        levers = trials.finder.levers(found)
+        self.levers = trials.finder.levers(found)
         self.proof: ClosureCertificate | None = None
-        self.motors = Motors(levers, trials.limits, np.zeros(len(levers)))
+        self.motors = trials.hand.motors(self.levers, self.angles, STRONG_N_M)
         self.size = (
             grasp_size(np.array([each.position for each in self.contacts])) if found else 0.0
         )
@@ -182,9 +187,37 @@ class ClosedHand:
     @cached_property
     def idle(self) -> Array:
         """Forces without a load, (k, 3) [N]: those of a proof, or even pushes, as motors can."""
+        if self.is_balanced:
+            return GENTLE * self._resting()
         whole = pushes(self.contacts, self.proof, self.trials.push_n)
         used = np.abs(self.motors.torques(whole)) / self.motors.limits
         return GENTLE / max(1.0, float(used.max(initial=0.0))) * whole
+
+    @property
+    def is_balanced(self) -> bool:
+        """Whether contact forces must balance joints that one motor pulls."""
+        return len(self.motors.limits) > len(self.trials.hand.servos.names)
+
+    @property
+    def is_limp(self) -> bool:
+        """Whether motors that pull several joints can hardly squeeze the object at all."""
+        largest = float(np.linalg.norm(self.idle, axis=1).max(initial=0.0))
+        return self.is_balanced and largest < LEAST_SQUEEZE * self.trials.push_n
+
+    def _resting(self) -> Array:
+        """Return forces without a load that motors can exert: means of those at limits, (k, 3) [N].
+
+        Forces at the limits L and L' of a wrench and its opposite balance it and its opposite, and
+        so nothing in the shares L' and L. What motors can exert is convex.
+        """
+        found = self.limits(axis_wrenches(self.trials.body.radius))
+        half = len(found) // 2
+        means = [
+            (one.limit * other.forces + other.limit * one.forces) / (one.limit + other.limit)
+            for one, other in zip(found[:half], found[half:], strict=True)
+            if one.limit + other.limit > 0.0
+        ]
+        return np.mean(means or [np.zeros((len(self.contacts), 3))], axis=0)
 
     def limits(self, wrenches: Array) -> tuple[WrenchLimit, ...]:
         """Return what contacts and motors resist of wrenches about the centre of mass, (n, 6)."""
@@ -245,10 +278,12 @@ class ClosedHand:
         refuted = [(place, proof) for place, proof in found if not proof.closed]
         if refuted:
             place, proof = min(refuted, key=lambda each: each[1].margin)
-            told, own = self._told(self.idle), trials.hand.joints_of(place)
+            told, pulls = self._told(self.idle), trials.hand.servos.pulls
             # joints have no stops here, and what a record calls open may be no more so
-            anywhere = np.tile([-np.inf, np.inf], (len(told), 1))
-            told[own] = opened(self.found, self.motors.levers, self.angles, anywhere)[own]
+            anywhere = np.tile([-np.inf, np.inf], (len(self.angles), 1))
+            open_angles = opened(self.found, self.levers, self.angles, anywhere)
+            own = np.flatnonzero(pulls[:, trials.hand.joints_of(place)].any(axis=1))
+            told[own] = (pulls @ open_angles)[own]
             yield "one finger open", Trial(self._unresisted(proof), told, trials.friction)
 
     def _unresisted(self, proof: ClosureCertificate) -> Array:
@@ -264,8 +299,10 @@ class ClosedHand:
         return self.trials.setup.hold.control_load * self.trials.push_n / size * wrench
 
     def _told(self, forces: Array) -> Array:
-        """Return what joints are told so that motors make contact forces: (1), (j,) [rad]."""
-        return self.angles + self.motors.torques(forces) / self.trials.hand.servos.stiffness
+        """Return what servos are told so that motors make contact forces: (1), (u,) [rad]."""
+        servos = self.trials.hand.servos
+        torques = self.motors.torques(forces)[: len(servos.names)]
+        return servos.pulls @ self.angles + torques / servos.stiffness
 
     def lets_go_at(self, found: WrenchLimit, span: float) -> float:
         """Find by a slow rise which share of a limit is resisted; NaN where none is found.

@@ -8,7 +8,9 @@ levers L_k of the joints at them, and wanted openings g_k, the joints turn by th
 as far as their ranges let them; contacts that no joint moves stay. Forces f on the object are
 pressed by servos of the stiffness k that are told
 
-    q + L f / k.                                                                         (2)
+    q + L f / k                                                                          (2)
+
+where each joint has a servo; where one turns several joints, its torque is that of all of them.
 
 The forces are those of the proof of force closure, or one push along each normal where there is
 none, and their largest push is given.
@@ -29,6 +31,8 @@ from scenes.mujoco.hand_contacts import LinkContact
 from scenes.mujoco.mjcf_text import quaternion
 from sim_validate.judge.records import HandRecord
 
+UNLIMITED_N_M = 1e6
+"""Torque limit of a motor whose levers alone count [N m]."""
 OPENED_M = 0.005
 """Opening of fingers where a record has no posture before the grasp [m]."""
 LEAST_SHARE = 0.05
@@ -112,8 +116,9 @@ def completed(
         joints[0] = opened(contacts, levers, grasp, hand.ranges)
     if np.isnan(joints[2]).any():
         forces = pushes([each.contact for each in contacts], proof, push_n)
-        told = grasp + levers @ forces.ravel() / hand.servos.stiffness
-        joints[2] = np.clip(told, *hand.servos.spans.T)
+        motors = hand.motors(levers, grasp, UNLIMITED_N_M)
+        torques = motors.torques(forces)[: len(hand.servos.names)]
+        joints[2] = hand.servos.squeezing(grasp, torques)
     return replace(at, joints=joints)
 
 

@@ -1,6 +1,7 @@
 """Runs the commands that show results: a grasp (`view`), a run as pages (`report`), a trial again.
 
-The last is `replay`, which simulates one recorded trial again and writes its motion.
+The last is `replay`, which simulates one recorded trial again and writes its motion. `export`
+writes grasps, or a hand in them, for other programs.
 """
 
 import subprocess
@@ -13,8 +14,9 @@ from pkgutil import resolve_name
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.by_value import counted
 from grasp_core.errors import InputError
-from grasp_core.files.file_kinds import GRASPS, MANIFEST
+from grasp_core.files.file_kinds import GRASPS, MANIFEST, REACHES
 from grasp_core.files.records import record_of
 from grasp_core.files.text_files import write_text
 from grasp_core.messages import MICRO
@@ -22,6 +24,7 @@ from grasp_core.planning.grasps_json import load_grasps
 from grasp_core.planning.result import Plan
 from grasp_core.provenance import versions
 from grasp_core.values import Grasp
+from scenes import exports
 from scenes.drawing.clips import GraphicsError, has_display, write_clip, write_trial_clip
 from scenes.drawing.pages import turntable_page
 from scenes.drawing.pictures import Drawing
@@ -29,12 +32,12 @@ from scenes.mujoco.closure_scene import Scene, build_scene, write_scene
 from scenes.mujoco.mjcf_text import IDENTITY_POSE
 from scenes.settings import FingerSettings
 from sim_validate.closure.replaying import Recorded, Replayed, WantedTrial, recorded_in, replayed
-from sim_validate.commands import flags
+from sim_validate.commands import flags, simulation_flags
 from sim_validate.commands.console import Reporter
-from sim_validate.commands.exit_codes import Exit
+from sim_validate.commands.exit_codes import Exit, FlagsError
 from sim_validate.engine.setup import with_planned_radius
 from sim_validate.files.output_folders import alone_in
-from sim_validate.planning.asked_objects import grasp_with_id
+from sim_validate.planning.asked_objects import asked_grasps, grasp_with_id
 from sim_validate.report.report import Report, write_report
 from sim_validate.report.run_folder import RunFolder, folder_of, reaches_beside
 from sim_validate.report.sections import why_not_held
@@ -152,6 +155,58 @@ def shown_report(asked: flags.ReportFlags, reporter: Reporter) -> Report:
         reporter.warn(f"no clips: {report.no_clip}")
     reporter.say(f"report: open {report.index} in a browser")
     return report
+
+
+def export_grasps(command: simulation_flags.ExportFlags, reporter: Reporter) -> int:
+    """Write the grasps of a file as one file of another program's format."""
+    endings = simulation_flags.WRITTEN_ENDINGS[command.to]
+    if command.out.suffix.lower() not in endings:
+        raise FlagsError(
+            f"--out must end in {' or '.join(endings)} with --to {command.to}, got {command.out}"
+        )
+    if command.to == "isaac" and command.fingertip_radius_m is not None:
+        raise FlagsError(
+            "--fingertip-radius-m is for fingertips without a hand: leave it out with --to isaac"
+        )
+    chosen = asked_grasps(command.grasps, reporter, grasp=command.grasp, limit=command.limit)
+    if chosen is None:
+        return Exit.NONE
+    if command.to == "isaac":
+        written = _export_hand(command, chosen, reporter)
+    else:
+        radius = command.fingertip_radius_m
+        exports.export_grasps(chosen, command.out, fingertip_radius_m=radius)
+        written = [grasp.id for grasp in chosen]
+    if written:
+        reporter.say(f"wrote {command.out} with {counted(len(written), 'grasp')}")
+    out = str(command.out) if written else None
+    reporter.document({"to": command.to, "out": out, "grasps": written})
+    return Exit.GOOD if written else Exit.NONE
+
+
+def _export_hand(
+    command: simulation_flags.ExportFlags, chosen: Plan, reporter: Reporter
+) -> list[str]:
+    """Write the hand in the grasps in which it can open; return their names, none for no file."""
+    from sim_validate.hands.isaac import BY_THE_HAND, isaac_text, reached_grasps  # slow to load
+
+    path, folder = command.grasps, command.grasps.parent
+    reaches = reaches_beside(folder, load_grasps(path))
+    if reaches is None:
+        raise InputError(
+            f"{folder}: Isaac grasp files are of hands, so there must be a {REACHES} beside the "
+            f"grasps; `graspproof reach {path} --hand HAND --out {folder}` writes one"
+        )
+    wanted = {grasp.id for grasp in chosen}
+    asked = [each for each in reaches if each.id in wanted]
+    found = reached_grasps(asked)
+    reporter.say(
+        f"of {counted(len(wanted), 'grasp')} the hand {reaches.hand.name} reaches "
+        f"{sum(each.reach.reached for each in asked)}, and can open its fingers in {len(found)}"
+    )
+    if found:
+        write_text(command.out, isaac_text(reaches.hand, chosen.body.name, found, BY_THE_HAND))
+    return [each.name for each in found]
 
 
 SHOWN_ROWS = 12

@@ -23,6 +23,7 @@ def test_fingertips_are_named_by_site_geom_or_body(tips, tmp_path):
     assert [f.tip.radius for f in hand.fingers] == pytest.approx([0.007] * 4)
     assert hand.joints[1].lowest == pytest.approx(-0.5 * np.pi)
     assert [j.torque_limit_n_m for j in hand.joints[:3]] == [None, None, 0.4]
+    assert hand.palm_link == "base"
     angles = np.random.default_rng(10).uniform(*hand.ranges.T)
     model = mujoco.MjModel.from_xml_path(str(path))
     data = mujoco.MjData(model)

@@ -205,6 +205,7 @@ def coupled(tmp_path, equality, tendon=""):
 
 
 TEN = np.deg2rad(10.0)
+TIE = '<fixed name="tie"><joint joint="b0" coef="2"/><joint joint="c0" coef="1"/></fixed>'
 COUPLED = {
     "one": (rule("c0", "b0", "0.2 0.5 0 0 0"), [("c0", "b0", 0.5, 0.2 - 0.5 * TEN)]),
     "a chain": (
@@ -212,6 +213,10 @@ COUPLED = {
         [("b0", "a0", -2.0, TEN), ("c0", "a0", -1.0, 0.0)],
     ),
     "off": ('<joint joint1="c0" joint2="b0" active="false"/>', []),
+    "a tendon": (
+        '<tendon tendon1="tie" polycoef="0.3 0 0 0 0"/>',
+        [("b0", "c0", -0.5, 0.15 + TEN)],  # 2 (b0 - 10 degrees) + c0 = 0.3
+    ),
 }
 
 
@@ -219,7 +224,8 @@ COUPLED = {
 def test_equalities_are_about_the_angles_in_which_a_file_is_drawn(case, tmp_path):
     """The rule is c - 0 = 0.2 + 0.5 (b - 10 degrees), and a chain of rules ends at a free joint."""
     rules, wanted = COUPLED[case]
-    found = [(c.joint, c.driver, c.ratio, c.offset) for c in coupled(tmp_path, rules).couplings]
+    hand = coupled(tmp_path, rules, TIE if "tie" in rules else "")
+    found = [(c.joint, c.driver, c.ratio, c.offset) for c in hand.couplings]
     assert [each[:2] for each in found] == [each[:2] for each in wanted]
     for one, other in zip(found, wanted, strict=True):
         assert one[2:] == pytest.approx(other[2:], abs=1e-12)
@@ -258,7 +264,8 @@ REFUSED = {
     "loop": ('<connect body1="d0" body2="crank" anchor="0 0 0"/>',
              "joints a0, b0, c0 are in a loop that a connect closes"),
     "weld": ('<weld body1="d0" body2="d1"/>', "joints a0, b0, c0, a1, b1, c1 are in a loop"),
-    "tendon": ('<tendon tendon1="pull"/>', "joints b0, c0 are coupled by the length of tendon"),
+    "tendon": ('<tendon tendon1="pull" tendon2="tie"/>',
+               "joints b0, c0 are coupled by the length of tendon"),
 }  # fmt: skip
 
 
@@ -266,7 +273,7 @@ REFUSED = {
 def test_other_rules_are_refused_with_their_joints(case, tmp_path):
     equality, said = REFUSED[case]
     with pytest.raises(InputError, match=said):
-        coupled(tmp_path, equality, TENDON if case == "tendon" else "")
+        coupled(tmp_path, equality, TENDON + TIE if case == "tendon" else "")
 
 
 def test_a_weld_that_holds_the_palm_is_no_loop(tmp_path):
@@ -285,6 +292,8 @@ def test_fingers_with_joints_in_common_move_as_one(tmp_path):
     assert [j.name for j in hand.fingers[1].links[0:1]] == ["arch"]
     (coupling,) = hand.couplings
     assert (coupling.joint, coupling.driver, coupling.ratio) == ("arch of t2", "arch", 1.0)
+    assert hand.file_joints[2:4] == ("arch", "ja1")
+    assert hand.file_joints[5:7] == ("arch", "ja2")
     assert sum(len(each.shapes) for each in hand.links) == 10
     assert sum(each.mass_kg for each in hand.links) == pytest.approx(7 * 0.02 + 3 * BALL_KG)
     check_places(hand, text)

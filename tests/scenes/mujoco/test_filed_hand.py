@@ -200,7 +200,7 @@ def test_joints_move_as_in_the_file(texts, held, tmp_path):
             model = data.model
             columns[prefix] = model.jnt_dofadr[places]
             data.qvel[columns[prefix]] = speeds
-        own.ctrl[:] = told
+        own.ctrl[:] = hand.servos.pulls @ told
         for i in range(theirs.nu):
             name = theirs.joint(int(theirs.actuator_trnid[i, 0])).name
             their.ctrl[i] = OWN_SERVOS.get(name, 0.0) * told[JOINTS.index(name)]
@@ -222,7 +222,8 @@ def test_joints_move_as_in_the_file(texts, held, tmp_path):
         )
         for name in ("efc_type", "efc_pos", "efc_KBIP", "efc_frictionloss"):
             np.testing.assert_allclose(getattr(own, name), getattr(their, name), atol=1e-9)
-        for name in ("b0", "b1", "c0", "c1"):
+        assert own.qfrc_actuator[rows[0][JOINTS.index("b1")]] == 0.0  # it follows b0
+        for name in ("b0", "c0", "c1"):
             place = JOINTS.index(name)
             limit = {"c0": 0.3, "c1": 0.2}.get(name, np.inf)
             settling = 0.02 * STATED
@@ -230,19 +231,21 @@ def test_joints_move_as_in_the_file(texts, held, tmp_path):
             assert own.qfrc_actuator[rows[0][place]] == pytest.approx(
                 np.clip(expected, -limit, limit)
             )
-    assert np.isfinite(hand.servos.spans).all(axis=1).tolist() == [True] + [False] * 6
+    assert np.isfinite(hand.servos.spans).all(axis=1).tolist() == [True] + [False] * 5
+    assert hand.servos.names == ("a0", "a1", "a2", "b0", "c0", "c1")
 
 
 def test_servos_may_be_the_stated_ones_and_stops_and_touching_itself_left_out(held, tmp_path):
     hand = filed(tmp_path, ROOTS["free"][0], own_servos=False)
-    hinge = np.array([1.0, 400.0, 1.0, 1.0, 1.0, 1.0, 1.0])  # the slide is as one 5 cm from it
+    every = np.array([1.0, 400.0, 1.0, 1.0, 1.0, 1.0, 1.0])  # the slide is as one 5 cm from it
+    hinge = np.delete(every, JOINTS.index("b1"))  # which follows another
     np.testing.assert_allclose(hand.servos.stiffness, STATED * hinge)
     alike = hand.servos.alike(3.0, 0.2)
     np.testing.assert_allclose(alike.stiffness, 3.0 * hinge)
     np.testing.assert_allclose(alike.damping, 0.2 * hinge)
     np.testing.assert_allclose(alike.damped(0.03).damping, 0.6 * hinge)
     assert np.isinf(hand.servos.spans).all()
-    np.testing.assert_allclose(hand.servos.limits, [2.0, *[np.inf] * 4, 0.3, 0.2])
+    np.testing.assert_allclose(hand.servos.limits, [2.0, *[np.inf] * 3, 0.3, 0.2])
     rng = np.random.default_rng(0)
     alone, _ = compiled(held.by_filed_hand(replace(hand, meets_itself=False)))
     free, _ = compiled(held.by_filed_hand(replace(hand, stops=False, armature_kg_m2=2e-3)))
@@ -250,7 +253,66 @@ def test_servos_may_be_the_stated_ones_and_stops_and_touching_itself_left_out(he
     for _ in range(50):
         assert not own_contacts(alone, placed(alone, random_angles(rng), "hand/"))
     assert not free.jnt_limited.any()
-    np.testing.assert_allclose(free.dof_armature[6:] - kept.dof_armature[6:], 2e-3 * hinge)
+    np.testing.assert_allclose(free.dof_armature[6:] - kept.dof_armature[6:], 2e-3 * every)
+
+
+PULLED = HAND.replace(
+    "<actuator>",
+    """<tendon><fixed name="pull"><joint joint="c0" coef="2"/><joint joint="c1" coef="-.5"/></fixed>
+  <fixed name="hold"><joint joint="a2" coef="1"/><joint joint="a0" coef=".5"/></fixed></tendon>
+<actuator><position tendon="pull" kp="5" kv=".2" gear="2" forcerange="-.3 .2"/>""",
+).replace('<motor joint="c0" gear="3" forcerange="-.1 .1"/>', "").replace(
+    "</equality>", '<tendon tendon1="hold" polycoef=".1 0 0 0 0"/></equality>'
+)  # fmt: skip
+
+
+def test_tendons_pull_and_tie_joints_as_in_the_file(held, tmp_path):
+    """Torques of a motor that pulls two joints, and angles that a tendon of one length leaves."""
+    text = PULLED.format(joints=FREE, before="", after="", world="world", FOUR=FOUR)
+    hand, ours, theirs = both_models((text, text), held, tmp_path)
+    assert hand.servos.names == ("a0", "a1", "b0", "pull")
+    assert hand.servos.limits[-1] == pytest.approx(0.6)
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        angles, told = random_angles(rng), 0.3 * rng.normal(size=7)
+        own, their = placed(ours, angles, "hand/"), placed(theirs, angles)
+        own.ctrl[:] = hand.servos.pulls @ told
+        length = hand.servos.pulls[-1] @ told
+        their.ctrl[[theirs.actuator(i).name for i in range(theirs.nu)].index("")] = 2.0 * length
+        for model, data in ((ours, own), (theirs, their)):
+            mujoco.mj_forward(model, data)
+        for name in ("c0", "c1"):
+            ends = [data.joint(prefix + name).qfrc_actuator[0]
+                    for data, prefix in ((own, "hand/"), (their, ""))]  # fmt: skip
+            assert np.abs(ends[0]) > 0.0
+            if np.abs(own.actuator_force[-1]) < 0.39:  # theirs has other limits either way
+                assert ends[0] == pytest.approx(ends[1], abs=1e-9)
+        obeyed, _ = hand.following(np.array([angles[name] for name in JOINTS]))
+        a0, _, a2, b0, b1, *_ = obeyed
+        assert a2 + 0.5 * a0 == pytest.approx(0.5 * 0.3 + 0.1)  # c0 is drawn at .3
+        assert b1 == pytest.approx(0.1 + 0.5 * b0 + 0.2 * b0**2)
+
+
+def test_torques_of_motors_are_those_of_virtual_work(tmp_path):
+    """A motor's torque times its turn is the work of contact forces on joints that obey rules."""
+    text = PULLED.format(joints=FREE, before="", after="", world="world", FOUR=FOUR)
+    hand, rng = filed(tmp_path, text), np.random.default_rng(4)
+    angles, levers, small = rng.uniform(-1.0, 1.0, 7), rng.normal(size=(7, 6)), 1e-6
+    obeyed, turning = hand.following(angles)
+    for column, free in enumerate(("a0", "a1", "b0", "c0", "c1")):
+        moved = obeyed.copy()
+        moved[JOINTS.index(free)] += small
+        assert hand.following(moved)[0] - obeyed == pytest.approx(
+            small * turning[:, column], abs=1e-10
+        )
+    motors = hand.motors(levers, obeyed, 7.0)
+    assert motors.limits == pytest.approx([2.0, 7.0, 7.0, 0.6, 1e-6])
+    work = turning.T @ levers  # of the free joints, per contact force
+    pulled = hand.servos.pulls @ turning
+    # forces that leave the pulled joints in balance are borne by the motors alone
+    free = np.linalg.svd(motors.levers[4:])[2][1:].T
+    assert pulled.T @ motors.levers[:4] @ free == pytest.approx(work @ free)
+    assert np.abs(pulled.T @ motors.levers[:4] - work).max() > 0.1
 
 
 def test_every_shape_that_collides_may_touch_the_object_and_no_other(held, tmp_path):

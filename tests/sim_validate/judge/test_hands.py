@@ -107,11 +107,19 @@ def test_links_that_the_file_lets_touch_nothing_do_so_unless_all_do(shown, tmp_p
 
 TENDON = """<tendon><fixed name="cable">
 <joint joint="a" coef="1"/><joint joint="b" coef="1"/></fixed></tendon>"""
+OTHER = '<tendon><fixed name="other"><joint joint="b" coef="2"/></fixed></tendon>'
+ROPE = '<tendon><spatial name="rope"><site site="one"/><site site="two"/></spatial></tendon>'
+SITES = ('/><site name="one"', '/><site name="two"')
 
 
-def test_tendons_are_noted(tmp_path):
+def test_tendons_that_no_motor_pulls_are_noted(tmp_path):
     hand = judged_hand(written(tmp_path, rules=TENDON))
-    assert hand.notes == ("tendons are left out, as if joints had motors of their own: cable",)
+    said = "tendons are left out: no motor pulls them, or joints have motors, too: cable"
+    assert hand.notes == (said,)
+    motor = '<actuator><position tendon="cable"/></actuator>'
+    pulled = judged_hand(written(tmp_path, rules=TENDON + motor))
+    assert pulled.notes == ()
+    assert pulled.filed.servos.names == ("cable",)
 
 
 @pytest.mark.parametrize(
@@ -120,13 +128,15 @@ def test_tendons_are_noted(tmp_path):
         ('<equality><connect body1="left" body2="right" anchor="0 0 0"/></equality>',
          "left and right are in a loop that a connect closes, which is not simulated here"),
         ('<equality><weld body1="left"/></equality>', "are in a loop that a weld closes"),
-        (f'{TENDON}<equality><tendon tendon1="cable"/></equality>',
+        (f'{TENDON}{OTHER}<equality><tendon tendon1="cable" tendon2="other"/></equality>',
          "joints are coupled by the length of tendon cable, which is not simulated"),
+        (f'{ROPE}<actuator><position tendon="rope"/></actuator>',
+         "a motor pulls tendon rope, which is a cable, which is not simulated"),
     ],
 )  # fmt: skip
 def test_ties_that_are_not_simulated_are_refused(rules, said, tmp_path):
     with pytest.raises(InputError, match=f"own.xml: .*{said}"):
-        judged_hand(written(tmp_path, rules=rules))
+        judged_hand(written(tmp_path, *SITES, rules=rules))
 
 
 def test_what_is_no_hand_is_refused_with_what_is(tmp_path):

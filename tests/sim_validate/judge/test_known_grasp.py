@@ -12,9 +12,10 @@ from sim_validate.protocols.settings import JudgeSettings
 
 @pytest.mark.parametrize("push_n", [1.0, 20.0], ids=["settings limit", "motors limit"])
 @pytest.mark.parametrize("friction", [0.2, 0.8])
-def test_what_is_resisted_is_known_in_closed_form(push_n, friction):
+@pytest.mark.parametrize("coupled", [False, True], ids=["hinges", "hinges that follow"])
+def test_what_is_resisted_is_known_in_closed_form(push_n, friction, coupled):
     setup = JudgeSettings(friction=friction, push_n=push_n).setup
-    checks = KnownGrasp.of(setup, friction).checks()
+    checks = KnownGrasp.of(setup, friction, coupled=coupled).checks()
     assert len(checks) == 6
     assert all(each.passed for each in checks), [str(each) for each in checks]
 
