@@ -24,8 +24,8 @@ def test_it_writes_poses_that_are_in_force_closure(bracket_plan, tmp_path, capsy
     assert f"{summary['reached']} of 3 grasps were reached" in said
     assert "give the folder of grasps.json as --out" in said
     assert code == (Exit.GOOD if summary["reached"] == 3 else Exit.NEGATIVE)
-    ends = ("reached", "limit", "collision", "not_found", "no_closure")
-    assert sum(summary[key] for key in ends) == 3
+    ends = ("too_large", "too_small", "palm", "limit", "collision", "not_found", "no_closure")
+    assert summary["reached"] + sum(summary[key] for key in ends) == 3
     for each in (one.reach for one in found if one.reach.reached):
         assert each.certificate.verify()
         assert gc.force_closure(each.contacts, friction=found.friction).closed
