@@ -44,6 +44,7 @@ from sim_validate.hands import flags as hand_flags
 from sim_validate.hands.dexgraspbench import dex_record, write_dex_object, write_dex_record
 from sim_validate.hands.execute import executed_by_hand, hand_execution_settings
 from sim_validate.hands.reaches import CarriedMass, ReachedGrasp, Reaches
+from sim_validate.hands.torques import too_weak
 from sim_validate.hands.validate import MOST_PUSH_N, validate_hand
 from sim_validate.hands.verdict import HandVerdict
 from sim_validate.planning.asked_objects import asked_grasps
@@ -124,7 +125,8 @@ def reached_grasp(
         held = validate_hand(hand, body, reach, friction, agenda=HAND_AGENDA)
     if execution is not None:
         executed = executed_by_hand(hand, body, reach, friction, execution)
-    return found(carried(hand, body, reach, friction), held, executed)
+    weak = too_weak(hand, body, reach, friction, executed, execution)
+    return found(carried(hand, body, reach, friction), held, executed, weak)
 
 
 def _show(found: Reaches, reporter: Reporter) -> None:
@@ -145,6 +147,8 @@ def _show(found: Reaches, reporter: Reporter) -> None:
         causes = (f"{REASONS[each]} ({stopped[each]})" for each in REASONS if stopped[each])
         said += f"; what stops the hand in the others: {', '.join(causes)}"
     reporter.say(said)
+    if counts["torque"]:
+        reporter.say(f"in {counts['torque']} of those reached, the motors are too weak")
     if stopped.keys() - {"no closure"}:
         reporter.say("a pose that was not found may exist: more --starts may find some")
     if unclosed := stopped["no closure"]:
@@ -154,6 +158,8 @@ def _show(found: Reaches, reporter: Reporter) -> None:
         )
     for each in (one.reach for one in shown if not one.reach.reached):
         reporter.warn(f"{each.grasp}: {each.reason}: {each.explanation}")
+    for each in (one for one in shown if one.too_weak):
+        reporter.warn(f"{each.id}: torque: {each.too_weak}")
 
 
 def _draw_nearest(found: Reaches, saved: Plan, path: Path, reporter: Reporter) -> None:

@@ -59,6 +59,10 @@ class ReachedGrasp(Declared):
     """What the hand held with its motors; None where no simulation was asked for."""
     executed: ExecutedGrasp | None = None
     """What came of executing the grasp with the hand; None where it was not asked for."""
+    too_weak: str = ""
+    """Why the motors carry the hand's links or the object not where the hand stands, though strong
+    ones would; empty where they do, where limits or masses are unknown, or where there is no pose.
+    """
 
     @property
     def id(self) -> str:
@@ -127,9 +131,10 @@ class Reaches(AboutGrasps[ReachedGrasp]):
     @computed_field
     @property
     def summary(self) -> Mapping[str, int]:
-        """Numbers of grasps by how the search ended: reached, or what stopped the hand."""
+        """Numbers of grasps: reached, reached with too weak motors, and by what stops the hand."""
         reasons = [each.reach.reason for each in self.reaches]
-        ended = {"grasps": len(reasons), "reached": reasons.count("")}
+        weak = sum(bool(each.too_weak) for each in self.reaches)
+        ended = {"grasps": len(reasons), "reached": reasons.count(""), "torque": weak}
         return ended | {each.replace(" ", "_"): reasons.count(each) for each in REASONS}
 
     def finger_names(self, reach: HandReach) -> tuple[str, ...]:

@@ -8,6 +8,7 @@ import pytest
 import grasp_core as gc
 from grasp_core.files.file_kinds import REACHES
 from sim_validate.commands.exit_codes import Exit
+from sim_validate.files.results_folder import NEAREST_PICTURE
 from sim_validate.hands.reaches import Reaches
 from sim_validate.main import main
 from tests.three_fingers import THREE_TIPS, three_fingers_file
@@ -60,6 +61,21 @@ def test_a_grasp_that_is_not_reached_is_a_negative_answer(bracket_plan, tmp_path
     (only,) = answer("reach", bracket_plan, *asked, code=Exit.NEGATIVE)["reaches"]
     assert only["joints_rad"] is None
     assert "no pose was found" in only["explanation"]
+    assert only["nearest"]["gaps_m"]
+    out = tmp_path / "out"
+    assert main(["reach", str(bracket_plan), *map(str, asked), "--out", str(out)]) == Exit.NEGATIVE
+    picture = out / NEAREST_PICTURE
+    assert "with the hand plain where it came nearest" in picture.read_text()
+    shutil.copy(bracket_plan, out / "grasps.json")
+    shown = tmp_path / "shown.svg"
+    words = ["view", str(out), "--grasp", only["id"], "--picture", str(shown)]
+    assert main(words) == Exit.GOOD
+    assert shown.read_text() == picture.read_text()
+    assert main(["report", str(out), "-q"]) == Exit.GOOD
+    page = (out / "report" / "grasps" / f"{only['id']}.html").read_text()
+    assert f"pictures/{only['id']}-nearest.svg" in page
+    assert main(["reach", str(bracket_plan), "--limit", "1", "--out", str(out)]) == Exit.GOOD
+    assert not picture.exists()
 
 
 def coupled_file(folder):
@@ -147,4 +163,5 @@ def test_a_hand_too_weak_for_an_object_says_so(bracket_plan, tmp_path, capsys):
     assert one.reach.reached
     assert one.executed.execution is None
     assert "cannot carry its own links" in one.executed.reason
+    assert one.too_weak == one.executed.reason
     assert "not tried" in capsys.readouterr().err
