@@ -52,7 +52,7 @@ REASONS: dict[ReachReason, str] = {
     "too large": "the object is too large",
     "too small": "the object is too small",
     "palm": "the palm is in the way",
-    "collision": "other collisions",
+    "collision": "links or the table are in the way",
     "limit": "limits of joints",
     "not found": "no single cause",
     "no closure": "too few fingers for closure",
@@ -187,7 +187,8 @@ def _unknown(missed: Sequence[MissedPose], nearest: NearestPose) -> tuple[ReachR
         return "not found", said
     return "not found", (
         f"at the nearest, a fingertip was {MILLI * nearest.gaps_m.max():.3g} mm off its contact, "
-        "and leaving out single obstacles did not help; more starts may find one"
+        "and neither without single obstacles nor on a copy of another size does the hand stand in "
+        "the grasp; more starts may find a pose"
     )
 
 
