@@ -257,6 +257,11 @@ class Drives:
         """Return the numbers of the joints that move freely, (m,)."""
         return np.flatnonzero(self.drivers == np.arange(len(self.drivers)))
 
+    @property
+    def turning(self) -> Array:
+        """Return how far each joint turns per turn of the free ones, (j, m)."""
+        return self.ratios[:, None] * (self.drivers[:, None] == self.free)
+
     def obeyed(self, angles: Array) -> Array:
         """Return angles (n, j) with those of followers put in by (2)."""
         found = self.offsets + self.ratios * angles[:, self.drivers]

@@ -265,18 +265,6 @@ def stance_of(hand: Hand, reach: HandReach) -> Stance:
     )  # fmt: skip
 
 
-def uncoupled(hand: Hand, doing: str) -> Hand:
-    """Return a hand in which no joint follows another."""
-    instance(hand, Hand, "hand", "load_hand makes one")
-    if hand.couplings:
-        listed = ", ".join(f"{each.joint} follows {each.driver}" for each in hand.couplings)
-        raise InputError(
-            f"{doing} needs a hand with a motor at each joint, got {hand.name}, where {listed}; "
-            "reach_with, hand_motors and hand_payload take such hands"
-        )
-    return hand
-
-
 def with_balls(
     hand: Hand, joints: Array, palm_pose: Array, fingers: Iterable[int],
     contacts: Iterable[Contact],

@@ -1,4 +1,4 @@
-"""The chains of a hand in a pose, as MJCF bodies, and how its joints move and load fingertips.
+"""The chains of a hand in a pose, as MJCF bodies.
 
 Each link is a body on a hinge, turned as in the pose, so that all hinges stand at zero. A
 fingertip is the ball that the analysis knows, or a block with its corners. Shapes of links may
@@ -8,19 +8,15 @@ Masses and inertias of links, where no source states them or the mass is none, a
 their shapes. Shapes are taken as solid and of one density, and as apart where they overlap. A shape
 with rounded edges has its true volume, and the inertia of the box around it.
 
-Servos turn the joints: one of stiffness k_q is told to go to the angle u = tau / k_q beyond that of
-the pose, which makes it apply the torque tau as long as the joint stands still, and never more than
-the motor's limit, its `forcerange`. So contact forces f are commanded by
-
-    u = (L f + g) / k_q                                                                  (1)
-
-with the levers L and the torques g of gravity in `Motors`.
+Servos turn the joints that follow no other, each with no more than the motor's limit, its
+`forcerange`. Joints that follow others are held by rules of MuJoCo's (`equality`) as hard as it
+allows. A fingertip may be a pad: a body of its own on three slides, with servos too.
 
 A hand may hang on a weld: its root is a free body that is welded to one that moves as told. A weld
 acts on a free body with the inverse mass w (MuJoCo's `body_invweight0`) as a spring of the
 stiffness
 
-    k d^2 / ((1 - d) w),   k = 1 / (d_max t z)^2                                          (2)
+    k d^2 / ((1 - d) w),   k = 1 / (d_max t z)^2                                          (1)
 
 with its `solref` (t, z) and the impedance d of its `solimp`, at most d_max: a light hand hangs on a
 soft one, and recoils as its fingers start.
@@ -28,27 +24,20 @@ soft one, and recoils as its fingers start.
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Any, Self
+from typing import Annotated, Any
 
 import numpy as np
 
-from grasp_core.arrays import Array, to_digits
+from grasp_core.arrays import Array, Shape, to_digits
 from grasp_core.by_value import ByValue
 from grasp_core.declared import Declared, declared
 from grasp_core.hands.hand import PALM_NAME, Hand, HandFinger, Link, LinkShape
-from grasp_core.hands.hand_arrays import (
-    HandPlaces,
-    jacobian,
-    places,
-    rotation_about,
-    tip_jacobians,
-)
-from grasp_core.hands.reach import Stance
-from grasp_core.quality.motors import Motors
+from grasp_core.hands.hand_arrays import places, rotation_about
 from scenes.mujoco.mjcf_text import (
     FREE_JOINT,
+    ORIGIN,
     SHAPE_BIT,
     TIP_LOOK,
     Element,
@@ -73,8 +62,10 @@ THIN_M = 1e-6
 """Least half-size of a box, for shapes that are flat [m]."""
 ROOT, ROOT_TOLD = "root", "told"
 """Names of the body that a weld holds, and of the one that moves as told."""
-REFINED = 3
-"""Newton steps that put fingertips on their faces: from 10 micrometres to rounding."""
+TIED = {"solref": (1e-3, 1.0), "solimp": (0.9999, 0.9999, 1e-3, 0.5, 1.0)}
+"""How hard joints follow others: as hard as MuJoCo allows, with a time constant of two steps."""
+PAD_SLIDES = ("a", "b", "c")
+"""Endings of the names of a pad's three slides."""
 
 
 def hand_inertials(hand: Hand) -> dict[str, dict[str, object]]:
@@ -133,6 +124,17 @@ class Weld(Declared):
         return body
 
 
+@declared
+class TipPads(Declared):
+    """Fingertips that give on their links, each by servos along three slides."""
+
+    axes: Annotated[Array, Shape("k", 3, 3)]
+    """Columns: directions of the slides of each fingertip that is used, (k, 3, 3)."""
+    mass_kg: float
+    stiffness_n_per_m: float
+    damping_n_s_per_m: float
+
+
 @dataclass(frozen=True, slots=True, eq=False, repr=False, kw_only=True)
 class HandChains(ByValue):
     """A hand in a pose, with what its joints, shapes and fingertips are to be in a scene."""
@@ -141,8 +143,8 @@ class HandChains(ByValue):
     angles: Array  # joint angles of the pose, (j,) [rad]
     palm_pose: Array  # pose of the palm in what it stands on, (4, 4)
     used_fingers: tuple[int, ...]  # the hand's fingers whose fingertips touch
-    limits: Array | None  # largest torque of each joint's motor, (j,) [N m]
-    servo: float  # stiffness of the joints' servos [N m/rad]
+    limits: Array | None  # largest torque of each motor, (m,) [N m]
+    servo_n_m_per_rad: float  # stiffness of the joints' servos
     damping_n_m_s_per_rad: float
     armature_kg_m2: float  # inertia that each joint has besides that of its links
     light_kg: float = NOMINAL_KG  # of links whose masses do not count
@@ -158,12 +160,14 @@ class HandChains(ByValue):
     """What the hand hangs on."""
     stops: bool = False
     """Whether joints and commands stop at the ends of the joints' ranges."""
+    pads: TipPads | None = None
+    """How fingertips that are used give on their links; None for hard ones."""
 
     def add_to(
         self, parts: Parts, parent: Element, touching: Sequence[dict[str, Any]],
         contact: dict[str, Any],
     ) -> None:  # fmt: skip
-        """Add the hand to a body, with a servo for each joint (see `Slides.add_to`)."""
+        """Add the hand to a body, with a servo for each motor (see `Slides.add_to`)."""
         hung = parent if self.weld is None else self.weld.add_to(parts, parent)
         pose = to_digits(self.palm_pose[:3, 3]), self.palm_pose[:3, :3]
         palm = add_element(hung, "body", {"name": PALM_NAME, **placed(*pose)})
@@ -183,16 +187,59 @@ class HandChains(ByValue):
                     shapes, touches = shapes[: -1 if finger.tip.corners is not None else None], 0
                 for place, shape in enumerate(shapes):
                     _shape(body, f"{link.name}_{place}", shape, touches, contact)
-            add_element(body, "geom", _tip(parts, finger) | tips.get(number, {}))
+            tip = _tip(parts, finger) | tips.get(number, {})
+            if self.pads is not None and number in tips:
+                body = self._pad(body, number, self.pads)
+                tip["pos"] = ORIGIN
+            add_element(body, "geom", tip)
         for one, other in _overlapping(self.hand):
             add_element(parts["contact"], "exclude", {"body1": one, "body2": other})
-        for number, joint in enumerate(self.hand.joints):
+        self._add_couplings(parts)
+        self._add_servos(parts["actuator"])
+
+    def _add_couplings(self, parts: Parts) -> None:
+        """Let joints follow others; in the pose all stand at zero."""
+        names = [joint.name for joint in self.hand.joints]
+        angles = dict(zip(names, self.angles.tolist(), strict=True))
+        for each in self.hand.couplings:
+            both = {"joint1": each.joint, "joint2": each.driver}
+            off = each.offset + each.ratio * angles[each.driver] - angles[each.joint]
+            turning = {"polycoef": (off, each.ratio, 0.0, 0.0, 0.0)}
+            add_element(parts["equality"], "joint", both | turning | TIED)
+
+    def _add_servos(self, actuators: Element) -> None:
+        for number, joint in enumerate(self.hand.free_joints):
             most = None if self.limits is None else float(self.limits[number])
             add_servo(
-                parts["actuator"], joint.name, self.servo, self.damping_n_m_s_per_rad,
+                actuators, joint.name, self.servo_n_m_per_rad, self.damping_n_m_s_per_rad,
                 None if most is None else (-most, most),
                 (joint.lowest, joint.highest) if self.stops else None,
             )  # fmt: skip
+        if (pads := self.pads) is not None:
+            for name in self.tip_names:
+                for ending in PAD_SLIDES:
+                    slide = f"{name}_{ending}"
+                    add_servo(actuators, slide, pads.stiffness_n_per_m, pads.damping_n_s_per_m)
+
+    def _pad(self, link: Element, finger: int, pads: TipPads) -> Element:
+        """Add the body of a fingertip that gives to its link, with slides along its axes."""
+        found, last = places(self.hand, self.angles, self.palm_pose), self.hand.chains[finger][-1]
+        back, tip = found.link_rotations[0, last].T, self.hand.fingers[finger].tip
+        name = self.tip_names[self.used_fingers.index(finger)]
+        place = placed(tip.center, back @ pads.axes[self.used_fingers.index(finger)])
+        body = add_element(link, "body", {"name": name, "gravcomp": 1.0} | place)
+        for ending, axis in zip(PAD_SLIDES, np.eye(3), strict=True):
+            slide = {"name": f"{name}_{ending}", "type": "slide", "axis": axis}
+            add_element(body, "joint", FREE_JOINT | slide)
+        inertia = 0.4 * pads.mass_kg * tip.radius**2
+        own = {"pos": ORIGIN, "mass": pads.mass_kg, "diaginertia": (inertia,) * 3}
+        add_element(body, "inertial", own)
+        return body
+
+    @property
+    def tip_names(self) -> tuple[str, ...]:
+        """Return the names of the fingertips' shapes in the scene."""
+        return tuple(f"tip_{self.hand.fingers[finger].name}" for finger in self.used_fingers)
 
     def _link(self, parent: Element, link: Link, angle: float) -> Element:
         mass, center, joint = self.light_kg, np.zeros(3), link.joint
@@ -210,123 +257,6 @@ class HandChains(ByValue):
         nominal = {"pos": center, "mass": mass, "diaginertia": (mass * NOMINAL_M**2,) * 3}
         add_element(body, "inertial", self.inertials.get(link.name, nominal))
         return body
-
-
-@dataclass(frozen=True, slots=True, eq=False, repr=False, kw_only=True)
-class StandingHand(HandChains):
-    """A hand that stands in a grasp, whose used fingers are in the order of the contacts."""
-
-    motors: Motors
-    axes: Array  # columns: directions along which motions of fingertips are told, (k, 3, 3)
-    normals: Array  # inward normals of the contacts, (k, 3)
-
-    @classmethod
-    def at(
-        cls, stance: Stance, origin: Array, centers: Array, motors: Motors, **numbers: Any
-    ) -> Self:
-        """Put a hand in its pose, with joints turned until fingertips are at their centres.
-
-        Takes the `origin` (3,) of the world in the object's frame, and centres (k, 3) in the world.
-        """
-        pose = stance.palm_pose.copy()
-        pose[:3, 3] -= origin
-        hand = cls(
-            hand=stance.hand, angles=stance.joints, palm_pose=pose, used_fingers=stance.fingers,
-            motors=motors, limits=motors.limits, **numbers,
-        )  # fmt: skip
-        return replace(hand, angles=to_digits(hand.reaching(centers)), palm_pose=to_digits(pose))
-
-    @property
-    def tip_names(self) -> tuple[str, ...]:
-        """Return the names of the fingertips' shapes in the scene."""
-        return tuple(f"tip_{self.hand.fingers[finger].name}" for finger in self.used_fingers)
-
-    @property
-    def tip_radii(self) -> Array:
-        """Return the radii of the fingertips at the contacts, (k,) [m]."""
-        return np.array([self.hand.fingers[finger].tip.radius for finger in self.used_fingers])
-
-    @property
-    def tip_centers(self) -> Array:
-        """Return the centres of the fingertips at their contacts, (k, 3) [m]."""
-        return self.tips(np.zeros((1, len(self.angles))))[0]
-
-    @property
-    def above_table(self) -> tuple[Array, Array]:
-        """Return tips and corners of shapes as balls: middles (n, 3) and radii (n,) [m]."""
-        found = self._places(np.zeros((1, len(self.angles))))
-        hand, pose = self.hand, self.palm_pose
-        parts = [(shape, pose[:3, :3], pose[:3, 3]) for shape in hand.palm]
-        for number, link in enumerate(hand.links):
-            frame = found.link_rotations[0, number], found.link_positions[0, number]
-            parts += [(shape, *frame) for shape in link.shapes]
-        signs = np.stack(np.meshgrid(*[(-1.0, 1.0)] * 3), axis=-1).reshape(-1, 3)
-        corners = [
-            origin + (shape.position + signs * shape.half_sizes @ shape.rotation.T) @ turned.T
-            for shape, turned, origin in parts
-        ]
-        radii = [np.full(len(signs), shape.radius) for shape, _, _ in parts]
-        every = [finger.tip.radius for finger in hand.fingers]
-        return np.vstack([*corners, found.tips[0]]), np.concatenate([*radii, every])
-
-    def tips(self, joints: Array) -> Array:
-        """Compute the centres of the fingertips, (n, k, 3) [m], at joints (n, j) [rad]."""
-        return self._places(joints).tips[:, list(self.used_fingers)]
-
-    def efforts(self, forces: Array) -> Array:
-        """Compute torques of servos, (n, j) [N m], for contact forces (n, k, 3) [N], as in (1)."""
-        return forces.reshape(len(forces), -1) @ self.motors.levers.T + self.motors.gravity
-
-    def joints(self, reached: Array) -> Array:
-        """Find the turns of joints, (j,) [rad], that move tips along their axes, (k, 3) [m]."""
-        goals = self.tip_centers + np.einsum("kij,kj->ki", self.axes, reached)
-        return self.reaching(goals) - self.angles
-
-    def reaching(self, centers: Array) -> Array:
-        """Turn the joints by the least angles that put fingertips on their places, (j,) [rad]."""
-        joints, used = self.angles, list(self.used_fingers)
-        for _ in range(REFINED):
-            tips = places(self.hand, joints, self.palm_pose).tips[0, used]
-            J = tip_jacobians(self.hand, joints, self.palm_pose)[0, used].reshape(-1, len(joints))
-            joints = joints + np.linalg.lstsq(J, (centers - tips).ravel(), rcond=None)[0]
-        return joints
-
-    def seen(self, joints: Array, loads: Array, turned: Array) -> tuple[Array, Array, Array | None]:
-        """See what fingers did (see `Slides.seen`).
-
-        Contact forces are those that load the joints of their finger with its torques, at the
-        points where fingertips touch: behind their middles, along normals that turn with the
-        object.
-        """
-        used = list(self.used_fingers)
-        found, rest = self._places(joints), self._places(np.zeros((1, len(self.angles))))
-        tips, last = found.tips[:, used], [self.hand.chains[finger][-1] for finger in used]
-        normals = np.einsum("nij,kj->nki", turned, self.normals)
-        points = tips + self.tip_radii[:, None] * normals
-        forces = np.stack(
-            [self._force(found, points[:, k], loads, finger) for k, finger in enumerate(used)],
-            axis=1,
-        )
-        moved = tips - rest.tips[:, used]
-        back: Array = rest.link_rotations[:, last].transpose(0, 1, 3, 2)
-        return (
-            np.einsum("kij,nki->nkj", self.axes, moved),
-            np.einsum("kij,nki->nkj", self.axes, forces),
-            found.link_rotations[:, last] @ back,
-        )
-
-    def _force(self, found: HandPlaces, points: Array, loads: Array, finger: int) -> Array:
-        """Return the contact force of a finger whose torques are known, (n, 3) [N]."""
-        own = self.hand.chains[finger]
-        turns: Array = jacobian(self.hand, found, own[-1], points)[:, :, own]
-        square: Array = turns @ turns.transpose(0, 2, 1)
-        known = np.isfinite(square).all(axis=(1, 2))
-        square[~known] = np.eye(3)  # where the simulator diverged
-        asked = -np.einsum("nij,nj->ni", turns, loads[:, own])
-        return np.asarray(np.linalg.solve(square, asked[..., None]), dtype=np.float64)[..., 0]
-
-    def _places(self, joints: Array) -> HandPlaces:
-        return places(self.hand, self.angles + joints, self.palm_pose)
 
 
 def _tip(parts: Parts, finger: HandFinger) -> dict[str, Any]:

@@ -43,7 +43,7 @@ from scenes.mujoco_options import HARD_TIPS, PhysicsSettings, Softness
 from scenes.settings import FingerSettings, SurfaceChoice
 
 if TYPE_CHECKING:
-    from scenes.mujoco.chains import StandingHand
+    from scenes.mujoco.standing_hand import StandingHand
 
 SCALED = (
     "Masses and servos are scaled to suit the grasp: this scene is for tests of force closure. "

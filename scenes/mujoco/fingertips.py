@@ -73,6 +73,10 @@ class Slides(ByValue):
         """Find the positions of the slides, (3k,), that move tips along their axes, (k, 3) [m]."""
         return reached.ravel()
 
+    def commanded(self, joints: Array) -> Array:
+        """Return what servos are told where these positions are their zeros, (3k,) [m]."""
+        return joints
+
     def seen(self, joints: Array, loads: Array, turned: Array) -> tuple[Array, Array, Array | None]:
         """See what fingers did in n samples, as the palm sees it.
 

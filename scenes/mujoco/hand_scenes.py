@@ -15,18 +15,27 @@ torque that the motors cannot, and joints move by micrometres here.
 
 In scenes of execution the palm stands on the body that moves (see `held_scene`), and the object has
 its true mass. Palm and links touch the object where it comes to them, but for the last links, whose
-fingertips do. With the levers L_i of contact i, (joints, 3), a change df of the contact force turns
-the joints of its finger by -L_i df / k_q, and so moves the finger's point of contact by -L_i' L_i
-df / k_q. To small motions a finger is therefore a fingertip on springs of the stiffness
+fingertips do. Joints that follow others are held to them, and have the inertia and dampers of all.
 
-    K_i = k_q (L_i' L_i)^-1,                                                             (2)
+Let L_i be the levers of contact i, a row for each motor (see `Motors`). A change df of the contact
+force turns the motors by -L_i df / k_q, and so moves the finger's point of contact by
+-L_i' L_i df / k_q. A hand whose joints leave each point of contact free to move in all directions
+has hard fingertips. Others, stretched fingers and those whose joints follow one motor, are rigid in
+some direction, which no forces of springs describe: their fingertips are pads, which give on their
+links with the stiffness c = K and have a tenth of m_t. To small motions a finger is therefore a
+fingertip on springs of the stiffness
 
-and so are joint inertia a and dampers c_q: m_i = a (L_i' L_i)^-1, C_i = c_q (L_i' L_i)^-1. The
-inertia is that of rotors, which a moving palm does not load. What the squeeze adds to (2), as links
-turn under it, is in `grasp_core.hands.hand_motors`. (2) needs joints that let the point of contact
-move in all directions. A stretched finger, or one with two joints, is rigid in some direction,
-which no grip of springs describes. Motors have the torque limits that are left when they carry
-their links in any orientation (see `Motors`), so links weigh nothing in the scene.
+    K_i = (L_i' L_i / k_q + 1 / c)^-1,                                                    (2)
+
+with 1 / c = 0 for hard ones, and with the damping and the inertia
+
+    C_i = c_q / k_q K_i,   m_i = m_p + a / k_q K_i (1 - K_i / c)                          (3)
+
+of dampers c_q and joint inertia a; the dampers of pads are c_q c / k_q, and m_p is their mass.
+The inertia of joints is that of rotors, which a moving palm does not load. What the squeeze adds to
+(2), as links turn under it, is in `grasp_core.hands.hand_grips`. Motors have the torque limits that
+are left when they carry their links in any orientation (see `Motors`), so links weigh nothing in
+the scene.
 """
 
 import math
@@ -37,20 +46,28 @@ import numpy as np
 
 from grasp_core.allowed_values import instance
 from grasp_core.arrays import Array, rounded, to_digits
-from grasp_core.errors import InputError
 from grasp_core.execution.grips import Grip
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_arrays import direction
-from grasp_core.hands.hand_motors import HandGrip, hand_motors
-from grasp_core.hands.reach import HandReach, stance_of, uncoupled
+from grasp_core.hands.hand_grips import HandGrip
+from grasp_core.hands.hand_motors import hand_motors
+from grasp_core.hands.reach import HandReach, stance_of
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
-from scenes.mujoco.chains import StandingHand
+from scenes.mujoco.chains import TipPads
 from scenes.mujoco.closure_scene import GENTLE_SQUEEZE, Layout, Scene, arrange, to_text
-from scenes.mujoco.held_scene import HeldScene, held_layout, held_physics, held_text
+from scenes.mujoco.held_scene import (
+    HeldLayout,
+    HeldScene,
+    fastest_ring,
+    held_layout,
+    held_physics,
+    held_text,
+)
 from scenes.mujoco.mjcf_text import FINGERTIP_BIT
+from scenes.mujoco.standing_hand import StandingHand
 from scenes.mujoco_options import PhysicsSettings
 from scenes.settings import FingerSettings, HeldSettings
 
@@ -64,6 +81,8 @@ percent."""
 STRETCHED = 0.02
 """Least singular value of a finger's levers, over the root mean square of all, with which it
 counts as free to move in all directions."""
+PAD_MASS = 0.1
+"""Mass of a pad, over that of a fingertip on slides, which stands for a part of its finger."""
 LIGHT_KG = 1e-5
 """Mass of links on a moving wrist: ten thousand times less than objects', so that no joint feels
 the wrist's motion through them."""
@@ -75,7 +94,7 @@ def hand_layout(
 ) -> Layout:  # fmt: skip
     """Place an object and a hand, whose joints are turned until fingertips are on faces."""
     check_body(body)
-    stance = stance_of(uncoupled(hand, "a simulation of the hand"), reach)
+    stance = stance_of(hand, reach)
     motors = hand_motors(hand, reach, down=down)
     squeeze = squeezing(motors, stance.forces)
     push, radii = float(np.abs(squeeze).max()), stance.tip_radii
@@ -89,7 +108,7 @@ def hand_layout(
     holder = StandingHand.at(
         stance, body.center_of_mass,
         base.contacts - (radii - drive.indentation_m)[:, None] * normals, motors,
-        axes=base.frames, normals=normals, servo=servo, armature_kg_m2=armature,
+        axes=base.frames, normals=normals, servo_n_m_per_rad=servo, armature_kg_m2=armature,
         damping_n_m_s_per_rad=2.0 * math.sqrt(servo * armature), weighs=down is not None,
     )  # fmt: skip
     local = np.einsum("kij,ki->kj", base.frames, squeeze)
@@ -160,19 +179,30 @@ def build_hand_scene(
     return HandScene(to_text(layout, used), layout, used)
 
 
-def finger_springs(motors: Motors, stiffness_n_per_m: float) -> Array:
+def has_pads(hand: Hand, motors: Motors) -> bool:
+    """Return whether fingertips give on their links: some finger does not move in all directions.
+
+    Where joints follow others, all fingertips do.
+    """
+    levers = _by_contact(motors)
+    least = np.linalg.eigvalsh(levers.transpose(0, 2, 1) @ levers)[:, 0]
+    free = (least >= (STRETCHED * mean_lever(motors)) ** 2).all()
+    return bool(hand.couplings) or not free
+
+
+def finger_springs(motors: Motors, stiffness_n_per_m: float, *, pads: bool) -> Array:
     """Compute the stiffness (2) of each finger of a hand, (k, 3, 3) [N/m]."""
-    servo, size = servo_stiffness(motors, stiffness_n_per_m), mean_lever(motors)
-    levers = motors.levers.reshape(len(motors.limits), -1, 3).transpose(1, 0, 2)
-    least = np.sqrt(np.maximum(np.linalg.eigvalsh(levers.transpose(0, 2, 1) @ levers)[:, 0], 0.0))
-    if not (least >= STRETCHED * size).all():
-        raise InputError(
-            f"the finger at contact {int(np.argmin(least))} is stretched, or has fewer than three "
-            "joints: its fingertip cannot move in all directions, so no springs stand for its "
-            "joints; use another pose, or validate_hand"
-        )
-    springs = servo * np.linalg.inv(levers.transpose(0, 2, 1) @ levers)
+    levers, servo = _by_contact(motors), servo_stiffness(motors, stiffness_n_per_m)
+    give: Array = levers.transpose(0, 2, 1) @ levers / servo
+    if pads:
+        give = give + np.eye(3) / stiffness_n_per_m
+    springs = np.linalg.inv(give)
     return 0.5 * (springs + springs.transpose(0, 2, 1))
+
+
+def _by_contact(motors: Motors) -> Array:
+    """Return the levers of each contact, (k, motors, 3) [m]."""
+    return motors.levers.reshape(len(motors.limits), -1, 3).transpose(1, 0, 2)
 
 
 def servo_stiffness(motors: Motors, stiffness_n_per_m: float) -> float:
@@ -184,8 +214,7 @@ def strong_motors(hand: Hand, reach: HandReach) -> Motors:
     """Return the motors of a pose, which carry the links in any orientation if they weigh."""
     weighs = all(link.mass_kg is not None and link.center_of_mass is not None
                  for link in hand.links)  # fmt: skip
-    own = uncoupled(hand, "an execution with the hand")
-    return hand_motors(own, reach, any_orientation=weighs)
+    return hand_motors(hand, reach, any_orientation=weighs)
 
 
 def held_hand_scene(
@@ -195,31 +224,50 @@ def held_hand_scene(
     """Make a MuJoCo scene of an object with its true mass in a hand."""
     base = held_layout(body, grip, settings, reach_m)
     stance, motors = stance_of(hand, reach), strong_motors(hand, reach)
-    size = mean_lever(motors) ** 2
-    levers = motors.levers.reshape(len(motors.limits), -1, 3).transpose(1, 0, 2)
-    shares = np.einsum("kij,kli,klm,kmj->kj", base.axes, levers, levers, base.axes)  # L'L, diagonal
-    servo = instance(grip, HandGrip, "grip", "hand_grip makes one").servo_n_m_per_rad
-    inertia = settings.tip_mass_kg * size
+    held = instance(grip, HandGrip, "grip", "hand_grip makes one")
+    size, servo, give = mean_lever(motors) ** 2, held.servo_n_m_per_rad, held.pad_m_per_n
+    inertia, tip_kg = settings.tip_mass_kg * size, PAD_MASS * settings.tip_mass_kg if give else 0.0
     share_kg = base.object_kg / len(base.contacts) + settings.tip_mass_kg
     damping = 2.0 * settings.damping_ratio * np.sqrt(servo * share_kg * size)
     armature, damper = rounded(inertia), rounded(damping)
-    ring = math.sqrt(servo / armature)
+    pads, (ring, loose) = None, (math.sqrt(servo / armature),) * 2
+    if give:
+        pads = TipPads(base.axes, tip_kg, rounded(1.0 / give), rounded(damper / (servo * give)))
+        ring, loose = _padded_rates(base, pads, motors, servo / armature)
+    springs = base.stiffness  # along their axes
     layout = replace(
         base,
-        damping=damping / shares,
-        tip_masses=inertia / shares,
-        tips_carried=np.zeros(len(base.contacts)),
+        damping=damper / servo * springs,
+        tip_masses=tip_kg + armature / servo * springs * (1.0 - give * springs),
+        tips_carried=np.full(len(base.contacts), tip_kg),
         stiffest=servo / armature * base.tip_mass_kg,
-        # by (2) stiffness and inertia of the fingers are alike in all directions, and the object
-        # only adds inertia
+        # by (2) and (3) stiffness and inertia of hard fingertips are alike in all directions, and
+        # the object only adds inertia
         fastest_ring=ring,
-        fastest_tip=max(ring, damper / armature),
+        fastest_tip=max(loose, damper / servo * loose**2),
         holder=StandingHand.at(
             stance, body.center_of_mass, base.tip_centers, motors, axes=base.axes,
-            normals=base.frames[:, :, 0], servo=servo, damping_n_m_s_per_rad=damper,
+            normals=base.frames[:, :, 0], servo_n_m_per_rad=servo, damping_n_m_s_per_rad=damper,
             armature_kg_m2=armature, light_kg=LIGHT_KG, touches=FINGERTIP_BIT,
-            rubbing=(float(base.friction.max()), 0.0, 0.0),
+            rubbing=(float(base.friction.max()), 0.0, 0.0), pads=pads,
         ),
     )  # fmt: skip
     physics = held_physics(layout)
     return HeldScene(held_text(layout, physics), layout, physics)
+
+
+def _padded_rates(
+    base: HeldLayout, pads: TipPads, motors: Motors, joint_rate: float
+) -> tuple[float, float]:
+    """Bound the natural frequencies of an object on pads, and of a loose pad [rad/s].
+
+    With the blocks D_y of the joints and D_x of what is on the pads, the squares of the frequencies
+    are at most the sum of the largest eigenvalues of both. Takes that of the joints without pads.
+    """
+    levers, stiffness = _by_contact(motors), np.full_like(base.stiffness, pads.stiffness_n_per_m)
+    pressed = np.linalg.eigvalsh(levers.transpose(0, 2, 1) @ levers).max() / mean_lever(motors) ** 2
+    alone = pads.stiffness_n_per_m / pads.mass_kg
+    joints = joint_rate + float(pressed) * alone
+    whole = (base.object_kg, base.inertia_kg_m2)
+    held = fastest_ring(base.contacts, (base.axes, stiffness), pads.mass_kg, whole)
+    return math.sqrt(joints + held**2), math.sqrt(joints + alone)

@@ -19,12 +19,12 @@ from scenes.mujoco.published_tests import HandServos, is_covered
 def text_of_hand(hand: Hand, servos: HandServos) -> ModelText:
     """Write a hand as MJCF; the palm has the pose in its world that it has in its root."""
     used = [place for place, finger in enumerate(hand.fingers) if not is_covered(finger)]
-    limits = [joint.torque_limit_n_m for joint in hand.joints]
+    limits = [joint.torque_limit_n_m for joint in hand.free_joints]
     chains = HandChains(
         hand=hand, angles=np.zeros(len(hand.joints)), palm_pose=servos.root,
         used_fingers=tuple(used),
         limits=None if None in limits else np.array(limits, np.float64),
-        servo=servos.stiffness_n_m_per_rad, armature_kg_m2=0.0,
+        servo_n_m_per_rad=servos.stiffness_n_m_per_rad, armature_kg_m2=0.0,
         damping_n_m_s_per_rad=servos.least_damping_n_m_s_per_rad, stops=True,
         inertials={**hand_inertials(hand), **servos.inertials},
     )  # fmt: skip

@@ -38,7 +38,7 @@ from scenes.mujoco_options import PhysicsSettings
 from scenes.settings import SAMPLE_S, HeldSettings
 
 if TYPE_CHECKING:
-    from scenes.mujoco.chains import StandingHand
+    from scenes.mujoco.standing_hand import StandingHand
 
 PALM_ARMATURE = 1e7
 """Armature of the palm's joints, relative to what the palm carries."""
@@ -137,8 +137,10 @@ class HeldLayout(SceneObject):
         return float(((way @ self.axes) ** 2 * self.stiffness).sum())
 
     def commands(self, shares: Array, reached: Array | None) -> Array:
-        """Find what the servos are told, (n, joints), for shares (n, k) of the squeeze."""
-        base = 0.0 if reached is None else self.holder.joints(reached)
+        """Find what the servos are told, (n, u), for shares (n, k) of the squeeze."""
+        base = 0.0
+        if reached is not None:
+            base = self.holder.commanded(self.holder.joints(reached))
         forces = shares[:, :, None] * self.squeeze
         return base + self.holder.efforts(forces) / self.holder.servo
 
@@ -181,7 +183,7 @@ def held_layout(
         tip_masses=np.full(stiffness.shape, tip_kg),
         tips_carried=np.full(len(contacts), tip_kg),
         stiffest=stiffest,
-        fastest_ring=_fastest_ring(contacts, (axes, stiffness), tip_kg, (mass, inertia)),
+        fastest_ring=fastest_ring(contacts, (axes, stiffness), tip_kg, (mass, inertia)),
         fastest_tip=max(math.sqrt(stiffest / tip_kg), float(damping.max()) / tip_kg),
         gravity=gravity_of(settings),
         holder=Slides(
@@ -192,7 +194,7 @@ def held_layout(
     )  # fmt: skip
 
 
-def _fastest_ring(
+def fastest_ring(
     contacts: Array, springs: tuple[Array, Array], tip_kg: float, mass: tuple[float, Array]
 ) -> float:
     """Return a bound on the natural frequencies of an object on springs [rad/s].
@@ -299,7 +301,7 @@ def build_held_scene(
 def held_text(layout: HeldLayout, physics: PhysicsSettings) -> str:
     """Write the MJCF text of a held object; equal layouts give equal texts."""
     told = layout.commands(np.ones((1, len(layout.contacts))), None)[0]
-    rest = np.concatenate([IDENTITY_POSE, np.zeros(6 + len(told))])
+    rest = np.concatenate([IDENTITY_POSE, np.zeros(6), layout.holder.joints(0.0 * layout.pushes)])
     return scene_text(
         SceneContent(
             comment=TRUE_MASS,

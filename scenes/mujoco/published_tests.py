@@ -64,14 +64,20 @@ class TestedScene(SceneText):
     pushes_n: Array
     """Normal forces with which the fingers are told to squeeze, (k,) [N]."""
     opened: Array
-    """Commands with which the fingers are open, (u,) [m or rad]; the joints start there. Where a
+    """Positions in which the fingers are open, (u,) [m or rad]; the joints start there. Where a
     hand hangs on a weld, the pose (7,) that its root is told to have comes first."""
     shut: Array
-    """Commands with which they just touch, (u,) [m or rad]."""
+    """Positions in which they just touch, (u,) [m or rad]."""
     squeezing: Array
     fingers: tuple[tuple[str, ...], ...]
     axes: Array = field(default_factory=lambda: np.eye(3))
     """Columns are the axes of the test's world, along which it pulls, in the scene's, (3, 3)."""
+    driven: Array | None = None
+    """What a servo is told of these positions of joints, (servos, joints); None for its own."""
+
+    def told(self, postures: Array) -> Array:
+        """Return what servos are told in postures of the joints, (n, servos)."""
+        return postures if self.driven is None else postures @ self.driven.T
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -156,7 +162,7 @@ class TestedObject:
         chains = HandChains(
             hand=hand, angles=np.zeros(len(hand.joints)),
             palm_pose=servos.root if free else palms[1], used_fingers=tuple(used),
-            limits=postures.limits_n_m, servo=servos.stiffness_n_m_per_rad,
+            limits=postures.limits_n_m, servo_n_m_per_rad=servos.stiffness_n_m_per_rad,
             armature_kg_m2=servos.armature(step_s), damping_n_m_s_per_rad=servos.damping(step_s),
             rubbing=self.physics.rubbing(self.friction), weld=servos.weld, stops=free,
             inertials={**hand_inertials(hand), **servos.inertials} if free else {},
@@ -166,6 +172,7 @@ class TestedObject:
             chains, [FINGERTIP_BIT if tip.corners is None else SHAPE_BIT for tip in tips],
             pushes_n=postures.pushes_n, opened=opened, shut=shut, squeezing=squeezing,
             fingers=tuple(tuple(link.name for link in finger.links) for finger in hand.fingers),
+            driven=np.eye(len(hand.joints))[hand.drives.free] if hand.couplings else None,
         )  # fmt: skip
 
     def by_filed_hand(self, hand: FiledHand) -> TestedScene:
@@ -184,7 +191,8 @@ class TestedObject:
         torques = to_digits(scene.hand.efforts(scene.layout.squeeze_forces[None]))[0]
         opened = shut if reach.pregrasp is None else reach.pregrasp
         palm[:3, 3] += self.body.center_of_mass
-        joints = np.array([opened, shut, shut + torques / stiffness_n_m_per_rad])
+        turned = hand.drives.turning @ torques / stiffness_n_m_per_rad
+        joints = np.array([opened, shut, shut + turned])
         pushes = scene.layout.squeeze[:, 0]
         return Postures(np.tile(palm, (3, 1, 1)), joints, pushes, scene.hand.limits)
 
@@ -207,7 +215,9 @@ class TestedObject:
         )
         rubbing, opened = physics.rubbing(self.friction), told["opened"]
         pose = POSE_NUMBERS if isinstance(holder, HandChains) and holder.weld is not None else 0
-        key = {"qpos": np.concatenate([IDENTITY_POSE, opened]), "ctrl": opened[pose:]}
+        driven = told.get("driven")
+        begun = opened[pose:] if driven is None else driven @ opened[pose:]
+        key = {"qpos": np.concatenate([IDENTITY_POSE, opened]), "ctrl": begun}
         moved = {"mpos": opened[:3], "mquat": opened[3:7]} if pose else {}
         content = SceneContent(
             comment=TESTED_COMMENT, held=held, physics=physics, rubbing=rubbing, holder=holder,

@@ -22,7 +22,7 @@ from grasp_core.files.records import RecordFile, record_of
 from grasp_core.hands.hand import Coupling, Hand, load_hand
 from grasp_core.hands.hand_motors import hand_payload
 from grasp_core.hands.obstacles import REASONS, SAME_OFF_M
-from grasp_core.hands.reach import HandReach, reach_with, uncoupled
+from grasp_core.hands.reach import HandReach, reach_with
 from grasp_core.hands.settings import ReachSettings
 from grasp_core.messages import MILLI
 from grasp_core.names import HANDS
@@ -190,8 +190,7 @@ def with_motors(hand: Hand, command: hand_flags.Reach) -> Hand:
         )
     if command.simulate or command.mass_kg is not None:
         asked = "--simulate" if command.simulate else "--mass-kg"
-        uncoupled(hand, asked)
-        missing = [joint.name for joint in hand.joints if joint.torque_limit_n_m is None]
+        missing = [joint.name for joint in hand.free_joints if joint.torque_limit_n_m is None]
         if missing:
             raise InputError(
                 f"{asked} needs a torque limit for each joint, but {hand.name} has none for "

@@ -39,7 +39,7 @@ from grasp_core.files.text_files import write_parts, write_text
 from grasp_core.hands.hand import PALM_NAME, Hand
 from grasp_core.hands.hand_arrays import places
 from grasp_core.hands.hand_motors import hand_motors
-from grasp_core.hands.reach import HandReach, Stance, stance_of, uncoupled
+from grasp_core.hands.reach import HandReach, Stance, stance_of
 from grasp_core.messages import UnfitError
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron, is_convex
@@ -216,7 +216,7 @@ def dex_record(
     Raises:
         InputError: The pose is another hand's, or none was found.
     """
-    stance = stance_of(uncoupled(hand, "a record of DexGraspBench"), reach)
+    stance = stance_of(hand, reach)
     value_of(Quantity, push_n, "push_n")
     own = hand_file(hand).stiffness_n_m_per_rad
     servo = own if servo_n_m_per_rad is None else servo_n_m_per_rad
@@ -227,7 +227,7 @@ def dex_record(
     normals = np.array([contact.normal for contact in stance.contacts])
     largest = float(np.einsum("ki,ki->k", stance.forces, normals).max())
     forces = push_n / largest * stance.forces
-    told = levers @ forces.ravel() / servo
+    told = hand.drives.turning @ (levers @ forces.ravel()) / servo
     pose = stance.palm_pose @ np.linalg.inv(hand_file(hand).root)
     root = np.concatenate([pose[:3, 3], quaternion(pose[:3, :3])])
     opened = stance.joints if reach.pregrasp is None else reach.pregrasp

@@ -14,13 +14,14 @@ from grasp_core.errors import InputError, NoForcesError
 from grasp_core.execution.grips import Grip, unsqueezed
 from grasp_core.execution.squeeze_certificate import BestSqueeze
 from grasp_core.hands.hand import Hand
-from grasp_core.hands.hand_motors import hand_grip
+from grasp_core.hands.hand_grips import hand_grip
 from grasp_core.hands.reach import HandReach
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
 from scenes.mujoco.hand_scenes import (
     finger_springs,
+    has_pads,
     held_hand_scene,
     servo_stiffness,
     strong_motors,
@@ -46,8 +47,8 @@ def execute_hand(
     """Simulate a grasp as a hand would execute it, and predict the outcome.
 
     Args:
-        hand: The hand, with a torque limit for each joint (`hand.with_torque_limits`), whose
-            fingers have at least three joints.
+        hand: The hand, with a torque limit for each joint (`hand.with_torque_limits`). Fingertips
+            are pads where joints follow others or a finger cannot give in all directions.
         body: The object.
         reach: The pose in which the hand stands (see `gc.reach_with`).
         friction: Coulomb coefficient at every contact.
@@ -59,8 +60,7 @@ def execute_hand(
             object is lost or has no squeeze (see `Execution.enough`), which takes up to a second.
 
     Raises:
-        InputError: Hand, object and pose do not belong together, a finger cannot give in all
-            directions, or a number is out of range.
+        InputError: Hand, object and pose do not belong together, or a number is out of range.
         NoForcesError: No squeeze within the motors' torques carries the weight, or the grip is
             unstable under the best one.
         UnfaithfulError: The simulator fails on a case with a known answer.
@@ -95,11 +95,13 @@ class HandHolder(Holder):
         hand, reach = self.hand, self.reach
         stance = closed_stance(hand, reach, self.friction)
         motors, spring = strong_motors(hand, reach), settings.tip_stiffness_n_per_m
+        pads = has_pads(hand, motors)
         loose = unsqueezed(
             self.body, stance.contacts, self.friction, tip_radius_m=stance.tip_radii,
-            stiffness=finger_springs(motors, spring),
+            stiffness=finger_springs(motors, spring, pads=pads),
         )  # fmt: skip
-        return hand_grip(hand, stance, loose, servo_stiffness(motors, spring)), motors
+        servo, give = servo_stiffness(motors, spring), 1.0 / spring if pads else 0.0
+        return hand_grip(hand, stance, loose, servo, give), motors
 
     def scene(self, settings: ExecutionSettings, best: BestSqueeze) -> HeldScene:
         """Build the scene in which a squeeze is executed."""

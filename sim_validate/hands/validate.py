@@ -47,7 +47,8 @@ def validate_hand(
     """Test a hand that stands in a grasp, and its negative controls, in simulation.
 
     Args:
-        hand: The hand, with a torque limit for each joint (`hand.with_torque_limits`).
+        hand: The hand, with a torque limit for each joint that follows no other
+            (`hand.with_torque_limits`).
         body: The object.
         reach: The pose in which the hand stands (see `gc.reach_with`).
         friction: Coulomb coefficient at every contact.
@@ -69,7 +70,7 @@ def validate_hand(
     contacts = closed_stance(hand, reach, friction).contacts
     scene = build_hand_scene(hand, body, reach, friction, down=down, physics=setup.physics)
     gate = checked(ClosureCase.of(setup, friction, body.radius))
-    known = checked(KnownHand.of(setup, friction))
+    known = checked(KnownHand.of(setup, friction, coupled=bool(hand.couplings)))
     rig = closed_on(scene, setup, friction, setup.hold.settling_friction * friction)
     case = HandCase(body, contacts, friction, setup, scene.hand.motors)
     loads = case.planned(rig.idle, agenda)
@@ -77,7 +78,7 @@ def validate_hand(
     controls = list[HandControlVerdict]()
     if agenda.controls:
         weakest = next(planned for planned in loads if planned.name == WEAKEST)
-        names = tuple(joint.name for joint in hand.joints)
+        names = tuple(joint.name for joint in hand.free_joints)
         for control in hand_controls(case, weakest, names):
             controls.append(try_hand_control(scene, control, weakest.limit, setup))
     return HandVerdict(

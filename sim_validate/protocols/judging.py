@@ -172,7 +172,7 @@ def _ours(
 ) -> OurVerdict:  # fmt: skip
     """Judge a hand by our trials."""
     checked(ClosureCase.of(setup, friction, body.radius))
-    checked(KnownHand.of(setup, friction))
+    checked(KnownHand.of(setup, friction, coupled=bool(hand.couplings)))
     held = build_hand_scene(hand, body, reach, friction, physics=setup.physics)
     contacts = stance_of(hand, reach).contacts
     analysis = LoadPlanner(body, contacts, friction, setup, held.hand.motors)
@@ -255,7 +255,7 @@ def their_verdicts(
         joints = np.concatenate([IDENTITY_POSE, begun[len(begun) - moving :]])
         runs += [
             replace(run, mocap=run.commands[:, :root] if root else None,
-                    commands=run.commands[:, root:], joints=joints)
+                    commands=scene.told(run.commands[:, root:]), joints=joints)
             for run in (timeline(protocol, scene, steps) for steps in protocol.runs)
         ]  # fmt: skip
     motions = bench.simulated(runs)

@@ -7,16 +7,11 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-import scenes
 from grasp_core.errors import InputError
 from grasp_core.hands.hand import Coupling
+from tests.grasp_core.hands.coupled_hand import coupled_hand, coupled_reaches, off
 from tests.grasp_core.hands.gripping import FRICTION, grasps, plain_hand, scaled
-from tests.three_fingers import THREE_TIPS, three_fingers_file
 
-CURLS = tuple(
-    Coupling(f"{finger}_curl", f"{finger}_bend", ratio, offset)
-    for finger, ratio, offset in (("thumb", 1.2, -0.1), ("left", 0.8, -0.2), ("right", 0.8, -0.2))
-)
 FALSE = {
     "unknown": (Coupling("f10", "elbow", 1.0), "single joints of the hand, got elbow"),
     "itself": (Coupling("f10", "f10", 1.0), "follow one free joint, got f10"),
@@ -27,24 +22,13 @@ FALSE = {
 
 
 @pytest.fixture(scope="module")
-def coupled(tmp_path_factory):
-    """A gripper whose fingers curl as they bend."""
-    path = three_fingers_file(tmp_path_factory.mktemp("hand"))
-    return replace(scenes.hand_from_file(path, THREE_TIPS), couplings=CURLS)
+def coupled():
+    return coupled_hand()
 
 
 @pytest.fixture(scope="module")
-def reached(coupled):
-    tried = [("box", grasp) for grasp in grasps("box", 0.035)]
-    found = [gc.reach_with(coupled, scaled(name, 0.035), g, FRICTION) for name, g in tried]
-    return [each for each in found if each.reached]
-
-
-def off(hand, joints):
-    """The largest difference from what the couplings say."""
-    angles = {joint.name: angle for joint, angle in zip(hand.joints, joints, strict=True)}
-    return max(abs(angles[c.joint] - c.offset - c.ratio * angles[c.driver])
-               for c in hand.couplings)  # fmt: skip
+def reached():
+    return coupled_reaches()
 
 
 def test_poses_obey_couplings_and_the_ranges_of_all_joints(coupled, reached):
@@ -72,7 +56,7 @@ def test_couplings_that_cannot_be_are_refused(case):
         replace(plain_hand(), couplings=(Coupling("f01", "f00", 1.0), coupling))
 
 
-def test_followers_need_no_torque_limit_and_simulations_name_them(coupled, reached):
+def test_followers_need_no_torque_limit(coupled, reached):
     fingers = tuple(
         replace(finger, links=tuple(
             replace(link, joint=replace(link.joint, torque_limit_n_m=None))
@@ -82,9 +66,6 @@ def test_followers_need_no_torque_limit_and_simulations_name_them(coupled, reach
     )  # fmt: skip
     each = reached[0]
     assert gc.hand_motors(replace(coupled, fingers=fingers), each).limits.tolist() == [0.5] * 5
-    body = scaled("box", 0.035)
-    with pytest.raises(InputError, match="thumb_curl follows thumb_bend"):
-        scenes.build_hand_scene(coupled, body, each, FRICTION)
 
 
 def test_a_pose_that_breaks_couplings_is_refused(coupled, reached):

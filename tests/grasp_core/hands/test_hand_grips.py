@@ -12,38 +12,59 @@ from tests.tampering.changes import forged
 
 SMALL = 1e-7
 """Size of a motion [m, rad] whose square is nothing beside it."""
-HANDS = ("leap", pytest.param("allegro", marks=pytest.mark.slow))
+HANDS = ("leap", "coupled", pytest.param("allegro", marks=pytest.mark.slow))
 
 
-def torques(hand, reach, k, joints, point_normal, force):
-    """Return l_a . f of a finger at joint angles, with the ball touching along a normal, (m,)."""
-    stance = stance_of(hand, reach)
-    rho, own = stance.tip_radii[k], list(hand.chains[stance.fingers[k]])
-    found = places(stance.hand, joints, stance.palm_pose)
-    point = found.tips[0, stance.fingers[k]] + rho * point_normal
-    arms = point - found.link_positions[0, own]
-    return np.cross(found.joint_axes[0, own], arms) @ force
+class Chain:
+    """A finger at contact k by the hand's kinematics, with a pad that gives on its link."""
+
+    def __init__(self, hand, stance, grip, k):
+        self.hand, self.stance, self.give = hand, stance, grip.pad_m_per_n
+        self.rho, self.own = stance.tip_radii[k], list(hand.chains[stance.fingers[k]])
+        self.finger, self.force, self.normal = stance.fingers[k], grip.squeeze[k], grip.normals[k]
+        self.turned = self.at(stance.joints).link_rotations[0, self.own[-1]]
+
+    def at(self, joints):
+        return places(self.stance.hand, joints, self.stance.palm_pose)
+
+    def point(self, joints, normal, force):
+        """Where it touches, (3,): the pad's force turns with the link that it gives on."""
+        found = self.at(joints)
+        R = found.link_rotations[0, self.own[-1]]
+        give = R @ (self.turned.T @ self.force - R.T @ force) * self.give
+        return found.tips[0, self.finger] + give + self.rho * normal
+
+    def torques(self, joints, normal, force):
+        """Torques of the contact force about all joints, (j,)."""
+        found, all_joints = self.at(joints), np.zeros(len(joints))
+        arms = self.point(joints, normal, force) - found.link_positions[0, self.own]
+        all_joints[self.own] = np.cross(found.joint_axes[0, self.own], arms) @ force
+        return all_joints
 
 
-@pytest.mark.parametrize("name", HANDS)
+@pytest.mark.parametrize("name", [*HANDS, "spreading"])
 def test_changes_of_force_balance_servos_that_follow_the_object(name):
-    """At forces changed by (6), servos turn the joints so that fingertips follow the object."""
+    """At forces changed by (5), servos turn the joints so that fingertips follow the object."""
     reach, hand, _, best = standing(name)
-    grip, stance = best.grip, stance_of(hand, reach)
+    grip, stance, turning = best.grip, stance_of(hand, reach), hand.drives.turning
+    chains = [Chain(hand, stance, grip, k) for k in range(len(grip.arms))]
+    rest = sum(each.torques(stance.joints, each.normal, each.force) for each in chains)
     rng = np.random.default_rng(0)
     for motion in rng.normal(size=(5, 6)) * np.repeat([1.0, 1.0 / grip.size], 3):
         d, t = motion[:3], motion[3:]
-        for k, finger in enumerate(stance.fingers):
-            own, n, f = list(hand.chains[finger]), grip.normals[k], grip.squeeze[k]
-            turned = n + SMALL * np.cross(t, n)
-            changed = f + SMALL * grip.force_changes[k] @ motion
-            rest = torques(hand, reach, k, stance.joints, n, f)
-            joints = stance.joints.copy()
-            for _ in range(20):
-                more = torques(hand, reach, k, joints, turned, changed) - rest
-                joints[own] = stance.joints[own] - more / grip.servo_n_m_per_rad
-            dq = (joints - stance.joints)[own] / SMALL
-            followed = np.cross(grip.joint_axes[k], grip.joint_arms[k]).T @ dq
+        turned = [each.normal + SMALL * np.cross(t, each.normal) for each in chains]
+        changed = [each.force + SMALL * grip.force_changes[k] @ motion
+                   for k, each in enumerate(chains)]  # fmt: skip
+        joints = stance.joints
+        for _ in range(20):
+            now = sum(map(Chain.torques, chains, [joints] * len(chains), turned, changed))
+            joints = stance.joints - turning @ turning.T @ (now - rest) / grip.servo_n_m_per_rad
+        for k, each in enumerate(chains):
+            # the point that is carried along, with the normal that it had
+            moved = each.point(joints, turned[k], changed[k]) - each.rho * turned[k]
+            began = each.point(stance.joints, each.normal, each.force) - each.rho * each.normal
+            R = each.at(joints).link_rotations[0, each.own[-1]] @ each.turned.T
+            followed = (moved + each.rho * R @ each.normal - began - each.rho * each.normal) / SMALL
             wanted = d + np.cross(t, grip.arms[k])
             assert followed == pytest.approx(wanted, abs=1e-3 * np.linalg.norm(wanted))
 
@@ -69,10 +90,11 @@ def test_a_small_motion_changes_the_wrench_by_the_grasp_stiffness(name):
             df = grip.force_changes[k] @ motion
             L = np.cross(grip.joint_axes[k], grip.joint_arms[k])
             moved = motion[:3] + np.cross(t, r)
-            # the fingertip's turn from the rigid motion of its chain that follows the object, as
-            # stiff servos find it: least squares in the metric of equal servos
-            dq = np.linalg.lstsq(L.T, moved, rcond=None)[0]
-            turn = grip.joint_axes[k].T @ dq
+            # the fingertip's turn from the motion of its chain that follows the object, as stiff
+            # servos find it: least squares in the metric of equal servos, less what a pad gives
+            free = L.T @ grip.joint_ratios[k]
+            dy = np.linalg.lstsq(free, moved + grip.pad_m_per_n * df, rcond=None)[0]
+            turn = grip.joint_axes[k].T @ grip.joint_ratios[k] @ dy
             shift = np.cross(t, r) + grip.tip_radius_m[k] * np.cross(t - turn, n)
             total += np.concatenate([df, np.cross(r, df) + np.cross(shift, f)])
         found = -grip.grasp_stiffness @ motion

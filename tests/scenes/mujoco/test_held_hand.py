@@ -4,9 +4,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from grasp_core.errors import InputError
+import grasp_core as gc
 from grasp_core.quality.motors import Motors
-from scenes.mujoco.hand_scenes import finger_springs
+from scenes.mujoco.hand_scenes import finger_springs, has_pads
 from sim_validate.execution.paths import closing
 from sim_validate.execution.simulate import HeldBench
 from tests.scenes.mujoco.compiled import compiled
@@ -15,6 +15,7 @@ from tests.sim_validate.hands.executing import standing
 WRITTEN = 2e-8
 """Scenes have nine digits of each number; a chain adds up their roundings."""
 HANDS = ("allegro", "leap")
+SEEN_HANDS = (*HANDS, "coupled")
 
 
 @pytest.mark.parametrize("hand", HANDS)
@@ -28,15 +29,17 @@ def test_springs_are_those_of_the_servos_by_the_simulators_own_jacobians(hand):
         mujoco.mj_jac(model, data, J, None, layout.contacts[contact], link)
         own = J[:, 12:]  # after the object's and the palm's joints
         springs = layout.axes[contact] * layout.stiffness[contact] @ layout.axes[contact].T
-        wanted = layout.holder.servo * np.linalg.inv(own @ own.T)
+        wanted = layout.holder.servo_n_m_per_rad * np.linalg.inv(own @ own.T)
         assert springs == pytest.approx(wanted, rel=1e-3, abs=1e-3 * np.abs(wanted).max())
         alike = layout.tip_masses[contact] / layout.stiffness[contact]
-        assert alike == pytest.approx(layout.holder.armature_kg_m2 / layout.holder.servo)
+        assert alike == pytest.approx(
+            layout.holder.armature_kg_m2 / layout.holder.servo_n_m_per_rad
+        )
 
 
-@pytest.mark.parametrize("hand", HANDS)
+@pytest.mark.parametrize("hand", SEEN_HANDS)
 def test_forces_seen_are_those_of_the_simulators_contacts(hand):
-    """Forces come from joint torques; MuJoCo's own contact forces are read beside them."""
+    """Forces come from joints or pads; MuJoCo's own contact forces are read beside them."""
     _, _, scene, _ = standing(hand)
     bench = HeldBench(scene)
     motion, state = bench.settled(closing())
@@ -57,26 +60,38 @@ def test_forces_seen_are_those_of_the_simulators_contacts(hand):
     assert seen == pytest.approx(found, abs=1e-3 * np.abs(found).max())
 
 
-def test_reached_places_are_met_by_joints():
-    """A fingertip that is told to stand elsewhere stands there, by the hand's own kinematics."""
-    _, _, scene, _ = standing("allegro")
-    layout = scene.layout
-    reached = np.random.default_rng(0).uniform(-1e-3, 1e-3, size=(4, 3))
+@pytest.mark.parametrize("hand", ["allegro", "coupled"])
+def test_reached_places_are_met_by_joints_or_pads(hand):
+    """A fingertip that is told to stand elsewhere stands there, by MuJoCo's kinematics."""
+    _, _, scene, _ = standing(hand)
+    layout, (model, data) = scene.layout, compiled(scene)
+    count = len(layout.contacts)
+    reached = np.random.default_rng(0).uniform(-1e-3, 1e-3, size=(count, 3))
     joints = layout.holder.joints(reached)
     tips, _, _ = layout.holder.seen(joints[None], np.zeros((1, len(joints))), np.eye(3)[None])
     assert tips[0] == pytest.approx(reached, abs=1e-7)
-    _, _, still = layout.holder.seen(np.zeros((1, 16)), np.zeros((1, 16)), np.eye(3)[None])
-    assert still == pytest.approx(np.tile(np.eye(3), (1, 4, 1, 1)), abs=WRITTEN)
+    data.qpos[13:] = joints  # after the object's and the palm's
+    mujoco.mj_kinematics(model, data)
+    placed = np.array([data.geom(name).xpos for name in layout.holder.tip_names])
+    wanted = layout.tip_centers + np.einsum("kij,kj->ki", layout.axes, reached)
+    assert placed == pytest.approx(wanted, abs=1e-7)
+    rest = np.zeros((1, len(joints)))
+    _, _, still = layout.holder.seen(rest, rest, np.eye(3)[None])
+    assert still == pytest.approx(np.tile(np.eye(3), (1, count, 1, 1)), abs=WRITTEN)
 
 
-def test_a_finger_that_is_rigid_in_some_direction_is_no_spring():
+def test_a_finger_that_is_rigid_in_some_direction_has_a_pad_that_gives_there():
     levers = np.zeros((4, 6))
     levers[:2, :3], levers[2:, 3:] = np.eye(3)[:2], np.eye(3)[1:]
-    with pytest.raises(InputError, match="contact 0 is stretched, or has fewer than three"):
-        finger_springs(Motors.of(levers, 1.0), 2000.0)
+    motors = Motors.of(levers, 1.0)
+    assert has_pads(gc.load_hand("leap"), motors)
+    # levers of one metre, so that servos and pads are springs of 2,000 N/m in series
+    one, other = finger_springs(motors, 2000.0, pads=True)
+    assert one == pytest.approx(np.diag([1000.0, 1000.0, 2000.0]))
+    assert other == pytest.approx(np.diag([2000.0, 1000.0, 1000.0]))
 
 
-@pytest.mark.parametrize("hand", HANDS)
+@pytest.mark.parametrize("hand", SEEN_HANDS)
 def test_balls_above_a_table_bound_the_hand(hand):
     """Support points of all geoms of the compiled hand are no lower than the balls say."""
     _, _, scene, _ = standing(hand)
@@ -85,7 +100,7 @@ def test_balls_above_a_table_bound_the_hand(hand):
     known = {"object", "table"}
     geoms = [g for g in range(model.ngeom) if model.geom(g).name not in known
              and not model.geom(g).name.startswith("surface")]  # fmt: skip
-    assert len(geoms) > 12
+    assert len(geoms) >= 10
     for way in np.random.default_rng(1).normal(size=(20, 3)):
         unit = way / np.linalg.norm(way)
         far = (middles @ unit + radii).max()

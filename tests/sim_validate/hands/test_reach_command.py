@@ -1,7 +1,6 @@
 """The command `reach`: its file, its exit codes, and what it refuses."""
 
 import shutil
-from pathlib import Path
 
 import pytest
 
@@ -11,7 +10,6 @@ from sim_validate.commands.exit_codes import Exit
 from sim_validate.files.results_folder import NEAREST_PICTURE
 from sim_validate.hands.reaches import Reaches
 from sim_validate.main import main
-from tests.three_fingers import THREE_TIPS, three_fingers_file
 
 
 def test_it_writes_poses_that_are_in_force_closure(bracket_plan, tmp_path, capsys):
@@ -78,26 +76,11 @@ def test_a_grasp_that_is_not_reached_is_a_negative_answer(bracket_plan, tmp_path
     assert not picture.exists()
 
 
-def coupled_file(folder):
-    """The gripper with fingers that curl as they bend."""
-    path = three_fingers_file(folder)
-    text = Path(path).read_text()
-    rules = "".join(
-        f'<joint joint1="{each}_curl" joint2="{each}_bend"/>' for each in ("left", "right")
-    )
-    Path(path).write_text(text.replace("</mujoco>", f"<equality>{rules}</equality></mujoco>"))
-    return ["--hand", path, "--fingertips", ",".join(THREE_TIPS)]
-
-
-def test_what_cannot_be_reached_or_simulated_is_refused(bracket_plan, tmp_path, capsys):
-    coupled = coupled_file(tmp_path)
-    others = "left_curl follows left_bend, right_curl follows right_bend"
+def test_what_cannot_be_reached_or_simulated_is_refused(bracket_plan, capsys):
     for flags, *said in (
         (["--hand", "nose"], "built-in hands are allegro, allegro-urdf, leap"),
         (["--simulate"], "give one for all joints with --torque-limit-n-m"),
         (["--mass-kg", "0.1"], "--mass-kg needs a torque limit for each joint"),
-        ([*coupled, "--simulate"], "--simulate needs a hand with a motor at each joint", others),
-        ([*coupled, "--mass-kg", "1"], "--mass-kg needs a hand with a motor at each joint", others),
     ):
         assert main(["reach", str(bracket_plan), *flags]) == Exit.INPUT
         found = capsys.readouterr().err
