@@ -148,3 +148,16 @@ def test_a_hand_too_weak_for_an_object_says_so(bracket_plan, tmp_path, capsys):
     assert "cannot carry its own links" in one.executed.reason
     assert one.too_weak == one.executed.reason
     assert "not tried" in capsys.readouterr().err
+
+
+def test_motors_too_weak_for_their_links_are_counted(bracket_plan, tmp_path, capsys):
+    words = ["reach", str(bracket_plan), "--hand", "leap", "--limit", "1", "--jobs", "1"]
+    main([*words, "--torque-limit-n-m", "0.01", "--out", str(tmp_path)])
+    said = capsys.readouterr()
+    found = Reaches.read(tmp_path / REACHES)
+    (one,) = found
+    assert one.payload is None
+    assert "the hand cannot carry its own links there" in one.too_weak
+    assert found.summary["torque"] == found.summary["reached"] == 1
+    assert "in 1 of those reached, the motors are too weak" in said.out
+    assert f"{one.id}: torque: {one.too_weak}" in said.err
