@@ -21,13 +21,14 @@ Both are checked by exact distances; the line at steps of `WAY_TICK`.
 """
 
 import math
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import combinations, permutations, product
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices, cross, to_digits
 from grasp_core.closure.closure_certificate import ClosureCertificate
@@ -90,6 +91,14 @@ ARM = 0.03  # length of the ways inwards where they are laid over each other [m]
 TIE_DIGITS = 9
 """Digits after the point to which rests, and cosines, are compared: ties are decided by the order.
 """
+NEVER_BEHIND = -10.0
+"""Distance that no part of a hand is short of, where parts need not stay behind a plane [m]."""
+FEW_STARTS = 16  # number of starts with which it is seen what stops a hand
+WIDER = math.radians(45.0)
+"""How far joints may turn beyond their ranges where limits are left out [rad]."""
+Obstacle: TypeAlias = Literal["self", "table", "palm", "links", "limit"]
+"""What may stop a hand: links that overlap each other, the table, the palm or other links that
+overlap the object, or the limits of joints."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,25 +110,46 @@ class AskedPose:
     grasp: Grasp
     friction: float
     settings: ReachSettings
+    left_out: frozenset[Obstacle] = frozenset()
+    """Obstacles that are taken to be none, to see what stops the hand."""
+    size: float = 1.0
+    """Size of the copy of the object and its grasp that is taken, as a multiple of their own."""
 
     @cached_property
     def table(self) -> tuple[Array, float]:
         """Return the table's unit normal, (3,), and its height along it [m]: -inf for none."""
         down = self.settings.table_down
-        if down is None:
+        if down is None or "table" in self.left_out:
             return np.array([0.0, 0.0, 1.0]), -np.inf
         up = -direction(down, "table_down")
-        return up, float((self.body.vertices @ up).min())
+        return up, self.size * float((self.body.vertices @ up).min())
 
     @cached_property
     def arrays(self) -> HandArrays:
-        """Return the hand in arrays."""
-        return hand_arrays(self.hand)
+        """Return the hand in arrays, without what is left out."""
+        arrays, out = hand_arrays(self.hand), self.left_out
+        if "self" in out:
+            arrays = arrays._replace(pairs=arrays.pairs[:0])
+        if "limit" in out:
+            free = arrays.drivers == np.arange(len(arrays.axes))
+            wider = np.where(free, WIDER, np.inf)[:, None] * [-1.0, 1.0]
+            arrays = arrays._replace(ranges=arrays.ranges + wider)
+        if not out & {"palm", "links"}:
+            return arrays
+        kept = np.where(arrays.ball_links < 0, "palm" not in out, "links" not in out)
+        return arrays._replace(
+            ball_links=arrays.ball_links[kept], ball_centers=arrays.ball_centers[kept],
+            ball_radii=arrays.ball_radii[kept],
+        )  # fmt: skip
 
     @cached_property
     def tree(self) -> SurfaceTree:
         """Return the object's surface."""
-        return surface_tree(self.body)
+        tree = surface_tree(self.body)
+        return tree if self.size == 1.0 else tree._replace(
+            corners=self.size * tree.corners, middles=self.size * tree.middles,
+            radii=self.size * tree.radii,
+        )  # fmt: skip
 
     def pose(self, contacts: int, palm: Array, origin: Array, joints: Array) -> HandPose:
         """Return a pose whose parts are still to be placed."""
@@ -167,12 +197,12 @@ def targets(asked: AskedPose, used: Indices, *, regions: bool) -> Targets:
     normals, own = asked.grasp.normals[used], [asked.grasp.regions[int(k)] for k in used]
     aimed = [regions and each.kind != "point" and each.inscribed_radius > NARROWEST for each in own]
     edges = [
-        _edges(region.polygon, normal) if aim else np.empty((2, 0, 3))
+        _edges(asked.size * region.polygon, normal) if aim else np.empty((2, 0, 3))
         for aim, region, normal in zip(aimed, own, normals, strict=True)
     ]
     numbers, (points, inward) = np.arange(len(used)), np.concatenate(edges, axis=1)
     return Targets(
-        numbers, to_digits(asked.grasp.positions[used]), normals,
+        numbers, to_digits(asked.size * asked.grasp.positions[used]), normals,
         np.array([plane_tangents(*normal) for normal in normals.tolist()]),
         np.where(aimed, 0.0, 1.0), np.full((len(used), 3), np.nan), SOUGHT_SOFTNESS,
         np.repeat(numbers, [each.shape[1] for each in edges]), points, inward,
@@ -267,43 +297,68 @@ class FoundPose:
     starts: int = 1  # number of starts that were tried
 
 
-def find_pose(asked: AskedPose, choices: Sequence[tuple[int, ...]]) -> FoundPose | Counter[str]:
-    """Look for a pose from one start after the other; without one, count how starts ended.
+@dataclass(frozen=True, slots=True, eq=False)
+class MissedPose:
+    """Where the search from one start ended without a pose that holds the object."""
 
-    They end `away` (fingertips do not touch), at a `limit` (the same, with a joint at one), with an
-    overlap (`self`, `object`, `table`), or `open` (no force closure).
-    """
-    tally: Counter[str] = Counter()
+    used: Indices  # indices of the grasp's contacts at which fingers were to stand, (k,)
+    aims: Targets  # where they were to touch, or do, with the finger at each
+    pose: HandPose
+    is_open: bool = False  # whether fingertips touch and nothing overlaps, but no force closure
+
+
+def find_pose(
+    asked: AskedPose, choices: Sequence[tuple[int, ...]]
+) -> FoundPose | tuple[MissedPose, ...]:
+    """Look for a pose from one start after the other; without one, return where all ended."""
+    missed = list[MissedPose]()
     for chosen in choices:
         used = np.array(chosen, np.int64)
         aims = targets(asked, used, regions=asked.settings.regions)
         for fingers, pose in starts(asked, aims.origins, aims.normals):
             ended = _tried(asked, used, aims._replace(fingers=fingers), pose)
-            if not isinstance(ended, str):
-                return replace(ended, starts=tally.total() + 1)
-            tally[ended] += 1
-    return tally
+            if isinstance(ended, FoundPose):
+                return replace(ended, starts=len(missed) + 1)
+            missed.append(ended)
+    return tuple(missed)
 
 
-def _tried(asked: AskedPose, used: Indices, aims: Targets, pose: HandPose) -> FoundPose | str:
-    """Move the hand from one start; return a pose, or what is in the way."""
+def pose_if(
+    asked: AskedPose, choices: Sequence[tuple[int, ...]], near: Sequence[MissedPose], **changed: Any
+) -> FoundPose | None:
+    """Look for a pose with something about the question changed: from poses, and few starts."""
+    few = replace(asked.settings, starts=min(FEW_STARTS, asked.settings.starts))
+    other = replace(asked, settings=few, **changed)
+    for ended in near:
+        aims = targets(other, ended.used, regions=few.regions)._replace(fingers=ended.aims.fingers)
+        pose = other.pose(len(ended.used), ended.pose.palm, ended.pose.origin, ended.pose.q)
+        found = _tried(other, ended.used, aims, pose)
+        if isinstance(found, FoundPose):
+            return found
+    found = find_pose(other, choices)
+    return found if isinstance(found, FoundPose) else None
+
+
+def _tried(
+    asked: AskedPose, used: Indices, aims: Targets, pose: HandPose
+) -> FoundPose | MissedPose:
+    """Move the hand from one start, in place, until it stands in the grasp or does not."""
     kernel = compiled(POSE_KERNEL)
     sums, clear = kernel.empty_sums(asked.arrays, aims), asked.settings.clearance_m
     room = clear + SEARCH_ROOM
-    far = Gaps(room, clear, room, EDGE_MARGIN, PULL, True, True)
+    behind = NEVER_BEHIND if "links" in asked.left_out else clear
+    far = Gaps(room, behind, room, EDGE_MARGIN, PULL, True, True)
     kernel.settle(asked.arrays, asked.tree, aims, far, pose, sums, MOST_SEARCH_STEPS, GOOD_MM)
     near = far._replace(overlaps=False, margin=LEAST_EDGE_MARGIN, pull=0.0)
     rest = None if sums.parts[0] > ROUGH_MM else _laid(asked, aims, near, pose)
     if rest is None:
-        low, high = asked.arrays.ranges.T
-        at_limit = ((pose.q <= low) | (pose.q >= high)) & (low < high)
-        return "limit" if at_limit.any() else "away"
+        return MissedPose(used, aims, pose)
     laid, points = rest
-    if blocked := blocking(asked, pose, aims.fingers):
-        return blocked
+    if blocking(asked, pose, aims.fingers):
+        return MissedPose(used, laid, pose)
     certificate = proved_closure(points, laid.normals, asked.friction)
     if certificate is None or not certificate.closed:
-        return "open"
+        return MissedPose(used, laid, pose, is_open=True)
     within = _are_within(aims, certificate.positions, EDGE_MARGIN)
     return FoundPose(used, laid, pose, certificate, within)
 
@@ -343,20 +398,38 @@ def _are_within(aims: Targets, points: Array, slack: float) -> tuple[bool, ...]:
     return tuple(within)
 
 
-def blocking(asked: AskedPose, pose: HandPose, fingers: Indices | None = None) -> str:
-    """Return what a placed hand overlaps: `self`, `object`, `table`, or nothing."""
-    arrays, clearance = asked.arrays, asked.settings.clearance_m
-    kernel = compiled("grasp_core.hands.collisions_kernel")
+def blocking(asked: AskedPose, pose: HandPose, fingers: Indices | None = None) -> bool:
+    """Return whether a placed hand overlaps something."""
+    return any(obstacles(asked, pose, asked.settings.clearance_m, fingers))
+
+
+def obstacles(
+    asked: AskedPose, pose: HandPose, clearance: float, fingers: Indices | None = None,
+    tips: float = -TIP_TOUCHING,
+) -> Iterator[Obstacle]:  # fmt: skip
+    """Yield what a placed hand is nearer to than a clearance.
+
+    The last links of touching fingers must only not overlap the object, and their tips keep a
+    distance of their own from it, or overlap it by as much.
+    """
+    arrays, kernel = asked.arrays, compiled("grasp_core.hands.collisions_kernel")
     needs = np.full(len(arrays.shape_links), clearance)
     if fingers is not None:
         needs[np.isin(arrays.shape_links, arrays.starts[fingers + 1] - 1)] = 0.0
-        needs[np.isin(arrays.shape_tips, fingers)] = -TIP_TOUCHING
+        needs[np.isin(arrays.shape_tips, fingers)] = tips
     shapes, (up, height) = (arrays, pose.turned, pose.middles), asked.table
     if kernel.of_itself(*shapes, clearance) < clearance:
-        return "self"
+        yield "self"
     if height > -np.inf and kernel.of_table(*shapes, up, height) < clearance:
-        return "table"
-    return "object" if kernel.of_object(*shapes, asked.tree, needs) < 0.0 else ""
+        yield "table"
+    of_palm = arrays.shape_links < 0
+    own: dict[Obstacle, NDArray[np.bool_]] = {"palm": of_palm, "links": ~of_palm}
+    for name in asked.left_out & own.keys():
+        needs[own[name] & (needs >= 0.0)] = -np.inf  # fingertips still must not overlap
+    if kernel.of_object(*shapes, asked.tree, needs) < 0.0:
+        for name, part in own.items():
+            if kernel.of_object(*shapes, asked.tree, np.where(part, needs, -np.inf)) < 0.0:
+                yield name
 
 
 GAPS_M = (0.015, 0.01, 0.006, 0.003)

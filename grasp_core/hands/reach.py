@@ -10,10 +10,9 @@ no three of the grasp's contacts are in force closure.
 The stance of a pose is what mechanics and scenes need of it, with balls for all fingertips.
 """
 
-from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field, computed_field
@@ -28,6 +27,7 @@ from grasp_core.figures import Shown
 from grasp_core.frames import POSE_SIZE
 from grasp_core.hands.hand import Fingertip, Hand
 from grasp_core.hands.hand_arrays import places
+from grasp_core.hands.obstacles import NearestPose, ReachReason, what_stops
 from grasp_core.hands.pose_search import AskedPose, contact_choices, find_pose, opened
 from grasp_core.hands.settings import ReachSettings
 from grasp_core.messages import shown
@@ -35,11 +35,6 @@ from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import FINGERS, Contact, Grasp
 
-ReachReason: TypeAlias = Literal["", "limit", "collision", "not found", "no closure"]
-"""Why no pose was found: fingertips stayed away with a joint at a limit, or touched but something
-overlapped, or neither; or, proved, no three contacts close for a hand with three fingers; empty
-where a pose was found."""
-OVERLAPS = {"self": "the hand itself", "object": "the object", "table": "the table"}
 OBEYED = 1e-6
 """By how much a joint may be off the angle that follows from another: rounding of a file [rad]."""
 
@@ -53,7 +48,7 @@ class HandReach(Declared):
     grasp: Annotated[str, Field(alias="id"), Shown("grasp")]
     """Id of the grasp."""
     reason: ReachReason
-    """Why no pose was found; empty where one was."""
+    """What stops the hand; empty where a pose was found."""
     explanation: str
     """Reason why no pose was found, as a sentence; empty where one was found."""
     starts: Annotated[Number, Shown("starts")]
@@ -86,6 +81,9 @@ class HandReach(Declared):
     open_choices: tuple[ClosureCertificate, ...] = ()
     """Proofs that choices of three contacts are not in force closure, where the reason is
     `no closure`."""
+    nearest: NearestPose | None = None
+    """The pose that came nearest to standing in the grasp, where none was found and some start was
+    tried."""
 
     def __post_init__(self) -> None:
         if self.fingers is not None and self.used is None:
@@ -99,6 +97,8 @@ class HandReach(Declared):
                 f"fingers, joints, palm_pose and certificate must be there exactly where the "
                 f"reason is empty, which is {shown(self.reason)} for grasp {self.grasp}"
             )
+        if self.nearest is not None and self.reached:
+            raise InputError(f"nearest must be None (null) where a pose was found, {self.grasp}")
         counts = {len(each) for each in (self.used, self.contacts, self.within_regions)
                   if each is not None}  # fmt: skip
         if len(counts) > 1:
@@ -184,9 +184,12 @@ def reach_with(
     if not closed:
         return _unclosed(asked, refuted, undecided)
     found = find_pose(asked, closed)
-    if isinstance(found, Counter):
-        reason, said = _why(found)
-        return HandReach(hand.name, grasp.id, reason, said, found.total(), clearance_m)
+    if isinstance(found, tuple):
+        stopped = what_stops(asked, found)
+        return HandReach(
+            hand.name, grasp.id, stopped.reason, stopped.explanation, len(found), clearance_m,
+            nearest=stopped.nearest,
+        )  # fmt: skip
     joints, way = opened(asked, found)
     palm_pose = np.eye(POSE_SIZE)
     palm_pose[:3, :3], palm_pose[:3, 3] = found.pose.palm, found.pose.origin
@@ -211,25 +214,6 @@ def _unclosed(
     return HandReach(
         name, asked.grasp.id, reason, said, 0, asked.settings.clearance_m, open_choices=refuted
     )  # fmt: skip
-
-
-def _why(tally: Counter[str]) -> tuple[ReachReason, str]:
-    tried = f"from {tally.total()} starts no pose was found"
-    blocked = {name: tally[name] for name in OVERLAPS if tally[name]}
-    if blocked:
-        most = max(blocked, key=lambda name: blocked[name])
-        return "collision", (
-            f"{tried}: where the fingertips touched ({sum(blocked.values())} times), the hand "
-            f"overlapped {OVERLAPS[most]} most often; more starts may find one"
-        )
-    if tally["limit"] > tally["away"]:
-        return "limit", (
-            f"{tried}: fingertips did not get to their contacts, mostly with a joint at its limit; "
-            "more starts may find one"
-        )
-    if tally["open"]:
-        return "not found", f"{tried}: the contacts that were touched are not in force closure"
-    return "not found", f"{tried}: fingertips did not get to their contacts; more starts may do"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -142,7 +142,7 @@ def _grid() -> tuple[Array, Truths]:
 
 @declared
 class PosedHand(Declared):
-    """A hand in a pose in which its fingertips touch an object."""
+    """A hand in a pose in which its fingertips touch an object, or came near."""
 
     hand: Hand
     joints: Annotated[Array, ArrayShape(None)]
@@ -151,6 +151,8 @@ class PosedHand(Declared):
     """Pose of the palm in the object's frame, (4, 4)."""
     fingers: tuple[int, ...]
     contacts: tuple[Contact, ...]
+    stands: bool = True
+    """Whether the fingertips touch, at the contacts."""
 
     def _check_together(self) -> None:
         joints, known, used = len(self.hand.joints), len(self.hand.fingers), set(self.fingers)
@@ -165,7 +167,9 @@ class PosedHand(Declared):
     @property
     def tips(self) -> Array:
         """Return the middles of the fingertips' balls at the contacts, (contacts, 3) [m]."""
-        hand = with_balls(self.hand, self.joints, self.palm_pose, self.fingers, self.contacts)
+        hand = self.hand
+        if self.stands:
+            hand = with_balls(hand, self.joints, self.palm_pose, self.fingers, self.contacts)
         return places(hand, self.joints, self.palm_pose).tips[0, list(self.fingers)]
 
     @property
@@ -185,7 +189,10 @@ class PosedHand(Declared):
 
 
 def posed_hand(hand: Hand | None, reach: HandReach | None, grasp: Grasp) -> PosedHand | None:
-    """Take a hand in its pose from what `reach_with` found; None if nothing is given."""
+    """Take a hand in its pose, or the nearest one, from what `reach_with` found.
+
+    None if nothing is given.
+    """
     if hand is None and reach is None:
         return None
     if hand is None or reach is None:
@@ -201,6 +208,10 @@ def posed_hand(hand: Hand | None, reach: HandReach | None, grasp: Grasp) -> Pose
             f"reach must be about the hand {hand.name} and the grasp {grasp.id}, got "
             f"{reach.hand} and {reach.grasp}"
         )
+    if (near := reach.nearest) is not None:
+        touched = tuple(grasp.contacts[int(k)] for k in near.used)
+        fingers = tuple(near.fingers.tolist())
+        return PosedHand(hand, near.joints, near.palm_pose, fingers, touched, stands=False)
     joints, pose, used, contacts = reach.joints, reach.palm_pose, reach.fingers, reach.contacts
     if joints is None or pose is None or used is None or contacts is None:
         raise InputError(f"reach must hold a pose to draw, got none: {reach.explanation}")
@@ -302,9 +313,9 @@ def _hull(corners: Array) -> tuple[Array, ...]:
 
 def numbers_behind(held: PosedHand) -> Array:
     """Return where the numbers of the fingers are written, behind the tips, (contacts, 3) [m]."""
-    places = held.positions
-    ways = (held.tips - places) / held.tip_radii[:, None]
-    return places + NUMBER_RADII * held.tip_radii[:, None] * ways
+    ways = held.tips - held.positions
+    ways /= np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), LEAST_RAY_M)
+    return held.tips + (NUMBER_RADII - 1.0) * held.tip_radii[:, None] * ways
 
 
 def extent_with(body: Polyhedron, parts: HandParts) -> Alone:

@@ -158,7 +158,8 @@ def show(
         grasp: A grasp on the faces of `body`.
         friction: Coulomb coefficient of the friction cones.
         hand: A hand to draw in place of straight fingers, with `reach`.
-        reach: The pose in which it stands in the grasp, as `gc.reach_with` finds it.
+        reach: The pose in which it stands in the grasp, as `gc.reach_with` finds it, or where it
+            came nearest.
 
     Raises:
         InputError: The grasp does not lie on the body, the friction is out of range, or `reach`

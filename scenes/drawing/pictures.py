@@ -164,6 +164,7 @@ class Drawing:
         name = f"Grasp {self.grasp.id} of {self.body.name}"
         if self.held is not None:
             name += f" with the hand {self.held.hand.name}"
+            name += "" if self.held.stands else " where it came nearest"
         shapes, view = self.shapes(), view or self.view()
         sheet = sheet_of(shapes, self.body, view, name, numbers=self.numbers(), side=PIXELS)
         if not legend:
@@ -336,7 +337,8 @@ def write_picture(
         friction: Coulomb coefficient of the friction cones.
         view: The view to draw from; None chooses the best one.
         hand: A hand to draw in place of straight fingers, with `reach`.
-        reach: The pose in which it stands in the grasp, as `gc.reach_with` finds it.
+        reach: The pose in which it stands in the grasp, as `gc.reach_with` finds it, or where it
+            came nearest.
 
     Raises:
         InputError: The ending is unknown, the grasp does not lie on the body, the friction is out

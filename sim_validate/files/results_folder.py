@@ -12,7 +12,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from grasp_core.errors import InputError
-from grasp_core.files.file_kinds import BESIDE, GRASPS, REGIONS, VERDICTS
+from grasp_core.files.file_kinds import BESIDE, GRASPS, REACHES, REGIONS, VERDICTS
 from grasp_core.files.text_files import UNFINISHED, write_text
 from sim_validate.files.locks import entries
 
@@ -20,6 +20,7 @@ REPORT, INDEX, GRASP_PAGES = "report", "index.html", "grasps"
 STYLE = "style.css"
 STATIC = (STYLE, "gallery.js", "tables.js", "turntable.js")
 BEST_PROOF = "best-proof.npz"
+NEAREST_PICTURE = "nearest-pose.svg"  # of a hand that does not stand in a grasp
 OF_EACH_GRASP: dict[str, tuple[str, str, bytes]] = {
     VERDICTS: ("traces", ".npz", b".times_s.npy"),
     REGIONS: ("proofs", ".npz", b"object_sha256.npy"),
@@ -59,6 +60,8 @@ def remove_results(folder: Path, file: str = GRASPS) -> None:
             ])  # fmt: skip
     if file == GRASPS:
         _remove([folder / BEST_PROOF])
+    if file in (GRASPS, REACHES):
+        _remove([folder / NEAREST_PICTURE])
 
 
 def _remove(paths: Iterable[Path]) -> None:

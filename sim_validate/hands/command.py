@@ -6,6 +6,7 @@ poses are written as records of DexGraspBench.
 
 import math
 import shlex
+from collections import Counter
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
@@ -16,18 +17,22 @@ from grasp_core.figures import NONE, meanings, table
 from grasp_core.files.file_kinds import GRASPS, REACHES
 from grasp_core.files.records import RecordFile, record_of
 from grasp_core.hands.hand import Hand, load_hand
+from grasp_core.hands.obstacles import REASONS, SAME_OFF_M
 from grasp_core.hands.reach import HandReach
 from grasp_core.messages import MILLI
 from grasp_core.names import HANDS
 from grasp_core.objects.polyhedron import Polyhedron, is_convex
 from grasp_core.planning.result import Plan
+from grasp_core.solvers.ties import first_best
+from scenes.drawing.hands import posed_hand
+from scenes.drawing.pictures import Drawing
 from scenes.hand_files.building import hand_from_file
 from sim_validate.commands.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.commands.exit_codes import Exit, FlagsError
 from sim_validate.execution.verdict import ExecutedGrasp, held_controls_in_words, loss_in_words
 from sim_validate.files.output_folders import alone_in
 from sim_validate.files.result_files import AboutObject
-from sim_validate.files.results_folder import remove_results
+from sim_validate.files.results_folder import NEAREST_PICTURE, remove_results
 from sim_validate.hands import flags as hand_flags
 from sim_validate.hands.dexgraspbench import dex_record, write_dex_object, write_dex_record
 from sim_validate.hands.reached_grasps import (
@@ -62,6 +67,8 @@ def reach_file(command: hand_flags.Reach, reporter: Reporter, judge: Judge | Non
     with alone_in(command.out):
         found = _reach(command, hand, chosen, reporter)
         _show(found, reporter)
+        if command.out is not None:
+            _draw_nearest(found, chosen, command.out / NEAREST_PICTURE, reporter)
         poses = [each.reach for each in found if each.reach.reached]
         if command.dexgraspbench is not None:
             write_records(command.dexgraspbench, hand, chosen.body, poses, reporter)
@@ -113,19 +120,34 @@ def _show(found: Reaches, reporter: Reporter) -> None:
         reporter.say(f"payload kg: {meanings(ReachedGrasp)['payload_kg']}")
     counts = found.summary
     said = f"{counts['reached']} of {counts['grasps']} grasps were reached"
-    if counts["collision"] + counts["limit"] + counts["not_found"]:
-        said += (
-            f"; of the others {counts['collision']} met a collision, {counts['limit']} a joint's "
-            f"limit, and for {counts['not_found']} no pose was found; more --starts may find some"
-        )
+    stopped = Counter(each.reach.reason for each in found if not each.reach.reached)
+    if stopped:
+        causes = (f"{REASONS[each]} ({stopped[each]})" for each in REASONS if stopped[each])
+        said += f"; what stops the hand in the others: {', '.join(causes)}"
     reporter.say(said)
-    if unclosed := counts["no_closure"]:
+    if counts["torque"]:
+        reporter.say(f"in {counts['torque']} of those reached, the motors are too weak")
+    if stopped.keys() - {"no closure"}:
+        reporter.say("a pose that was not found may exist: more --starts may find some")
+    if unclosed := stopped["no closure"]:
         reporter.say(
             f"{unclosed} have no {len(found.hand.fingers)} contacts that are in force closure "
             "alone, which is proved; more friction may help, and other grasps"
         )
     for each in (one.reach for one in shown if not one.reach.reached):
         reporter.warn(f"{each.grasp}: {each.reason}: {each.explanation}")
+    for each in (one for one in shown if one.too_weak):
+        reporter.warn(f"{each.id}: torque: {each.too_weak}")
+
+
+def _draw_nearest(found: Reaches, saved: Plan, path: Path, reporter: Reporter) -> None:
+    """Draw the pose that came nearest to a grasp, of all grasps that are not reached."""
+    missed = [(each.reach, each.reach.nearest.off_m) for each in found if each.reach.nearest]
+    if missed:
+        reach, _ = missed[first_best([-off for _, off in missed], SAME_OFF_M)]
+        held = posed_hand(found.hand, reach, grasp := saved[reach.grasp])
+        Drawing(saved.body, grasp, found.friction, held).sheet(legend=True).write(path)
+        reporter.say(f"drew the pose that came nearest, for {grasp.id}: {path}")
 
 
 def show_simulated(verdicts: Sequence[HandVerdict], reporter: Reporter) -> None:

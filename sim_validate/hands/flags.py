@@ -59,4 +59,5 @@ class Reach(Spoken):
     limit: FirstOnly = None
     jobs: Jobs = field(default_factory=available_cores)
     out: Path | None = None
-    """Folder for reaches.json; if not given, no file is written."""
+    """Folder for reaches.json, and for a picture of the nearest pose if a grasp is not reached; if
+    not given, no file is written."""

@@ -20,6 +20,7 @@ from sim_validate.engine.setup import Agenda
 from sim_validate.execution.verdict import ExecutedGrasp
 from sim_validate.hands.execute import executed_by_hand, hand_execution_settings
 from sim_validate.hands.reaches import CarriedMass, ReachedGrasp
+from sim_validate.hands.torques import too_weak
 from sim_validate.hands.validate import MOST_PUSH_N, validate_hand
 from sim_validate.hands.verdict import HandVerdict
 from sim_validate.settings import ExecutionSettings, HandTrials
@@ -55,7 +56,8 @@ def reached_grasp(
         held = validate_hand(hand, body, reach, friction, agenda=HAND_AGENDA)
     if task.execution is not None:
         executed = executed_by_hand(hand, body, reach, friction, task.execution, enough=task.enough)
-    return found(carried(hand, body, reach, friction), held, executed)
+    weak = too_weak(hand, body, reach, friction, executed, task.execution)
+    return found(carried(hand, body, reach, friction), held, executed, weak)
 
 
 def carried(hand: Hand, body: Polyhedron, reach: HandReach, friction: float) -> CarriedMass | None:

@@ -19,6 +19,7 @@ from grasp_core.figures import Shown
 from grasp_core.files.file_kinds import REACHES
 from grasp_core.hands.collisions import tip_distances
 from grasp_core.hands.hand import Hand
+from grasp_core.hands.obstacles import REASONS
 from grasp_core.hands.reach import HandReach
 from grasp_core.hands.settings import ReachSettings
 from sim_validate.execution.verdict import ExecutedGrasp
@@ -58,6 +59,10 @@ class ReachedGrasp(Declared):
     """What the hand held with its motors; None where no simulation was asked for."""
     executed: ExecutedGrasp | None = None
     """What came of executing the grasp with the hand; None where it was not asked for."""
+    too_weak: str = ""
+    """Why the motors carry the hand's links or the object not where the hand stands, though strong
+    ones would; empty where they do, where limits or masses are unknown, or where there is no pose.
+    """
 
     @property
     def id(self) -> str:
@@ -87,7 +92,7 @@ class Reaches(AboutGrasps[ReachedGrasp]):
 
     ITEMS = "reaches"
     FILE = REACHES
-    SCHEMA = 2
+    SCHEMA = 3
 
     hand: Hand
     asked: ReachSettings
@@ -107,11 +112,16 @@ class Reaches(AboutGrasps[ReachedGrasp]):
         """Say why a pose cannot be one of the hand; empty if it can."""
         if reach.hand != self.hand.name:
             return f"the pose is one of {reach.hand}"
+        known = len(self.hand.joints)
+        for pose in (reach, reach.nearest):
+            if pose is None or pose.joints is None or pose.fingers is None:
+                continue
+            if len(pose.joints) != known or pose.fingers.max(initial=0) >= len(self.hand.fingers):
+                fingers = pose.fingers.tolist()
+                return f"the pose has {len(pose.joints)} joints for {known}, and fingers {fingers}"
         if reach.joints is None or reach.palm_pose is None or reach.fingers is None:
             return ""
-        known, fingers = len(self.hand.joints), reach.fingers.tolist()
-        if len(reach.joints) != known or max(fingers, default=0) >= len(self.hand.fingers):
-            return f"the pose has {len(reach.joints)} joints for {known}, and fingers {fingers}"
+        fingers = reach.fingers.tolist()
         touched = np.array([contact.position for contact in reach.contacts or ()])
         off = np.abs(tip_distances(self.hand, reach.joints, reach.palm_pose, fingers, touched))
         if off.max(initial=0.0) > TOUCHING_M:
@@ -121,16 +131,11 @@ class Reaches(AboutGrasps[ReachedGrasp]):
     @computed_field
     @property
     def summary(self) -> Mapping[str, int]:
-        """Numbers of grasps by how the search ended: reached, or why not."""
+        """Numbers of grasps: reached, reached with too weak motors, and by what stops the hand."""
         reasons = [each.reach.reason for each in self.reaches]
-        return {
-            "grasps": len(reasons),
-            "reached": reasons.count(""),
-            "limit": reasons.count("limit"),
-            "collision": reasons.count("collision"),
-            "not_found": reasons.count("not found"),
-            "no_closure": reasons.count("no closure"),
-        }
+        weak = sum(bool(each.too_weak) for each in self.reaches)
+        ended = {"grasps": len(reasons), "reached": reasons.count(""), "torque": weak}
+        return ended | {each.replace(" ", "_"): reasons.count(each) for each in REASONS}
 
     def finger_names(self, reach: HandReach) -> tuple[str, ...]:
         """Name the finger at each contact; none for a grasp that is not reached."""

@@ -45,6 +45,8 @@ class Drawn:
     picture: str
     hand: str = ""
     """Path of the picture with the hand in the grasp; empty if there is none."""
+    nearest: str = ""
+    """Path of the picture with the hand in the pose that came nearest; empty if there is none."""
     wrenches: tuple[str, ...] = ()
     """Panels of the chart of wrenches; none if the contacts are not in force closure at this
     friction."""
@@ -139,6 +141,9 @@ def draw(folder: Path, card: Card) -> Drawn:
     drawn = Drawn(_picture(folder, card.name, drawing.sheet(view)))
     if (held := found.held) is not None:
         drawn.hand = _picture(folder, f"{card.name}-hand", replace(drawing, held=held).sheet())
+    if (near := found.nearest) is not None:
+        sheet = replace(drawing, held=near).sheet()
+        drawn.nearest = _picture(folder, f"{card.name}-nearest", sheet)
     if force_closure(found.shown, friction=drawing.friction).closed:
         drawn.wrenches = tuple(map(svg_of, wrench_panels(drawing, view)))
         drawn.margins = tuple(map(svg_of, margin_panels(drawing, largest_push(found.verdict))))

@@ -67,9 +67,11 @@ def view_grasp(command: flags.ViewFlags, reporter: Reporter) -> int:
         return Exit.GOOD
     reaches = reaches_beside(path.parent, saved) if command.hand else None
     found = RunFolder(path.parent, saved, friction, reaches=reaches).of(grasp)
+    held = found.held or found.nearest
     if reaches is not None and found.held is None:
-        reporter.warn(f"the hand is not shown: {why_not_held(found)}")
-    drawing, files = Drawing(saved.body, grasp, friction, found.held), list[str]()
+        shown = "not shown" if held is None else "shown where it came nearest"
+        reporter.warn(f"the hand is {shown}: {why_not_held(found)}")
+    drawing, files = Drawing(saved.body, grasp, friction, held), list[str]()
 
     def keep(path: Path) -> None:
         reporter.say(f"wrote {path}")

@@ -122,6 +122,14 @@ class Findings:
             return None
         return posed_hand(reaches.hand, found.reach, self.grasp)
 
+    @property
+    def nearest(self) -> PosedHand | None:
+        """The hand in the pose that came nearest to a grasp in which it does not stand."""
+        reaches, found = self.run.reaches, self.reached
+        if reaches is None or found is None or found.reach.nearest is None:
+            return None
+        return posed_hand(reaches.hand, found.reach, self.grasp)
+
 
 def said_of(verdict: Verdict | None) -> tuple[str, str]:
     """Say in words what the verdict on a grasp is, and of which kind: good, bad or quiet."""

@@ -11,6 +11,7 @@ import numpy as np
 from grasp_core.by_value import counted
 from grasp_core.figures import NONE, Figure, figures
 from grasp_core.files.records import record_of
+from grasp_core.hands.obstacles import REASONS
 from grasp_core.messages import MILLI
 from grasp_core.names import HANDS
 from scenes.drawing.pages import (
@@ -40,12 +41,6 @@ from sim_validate.settings import ExecutionSettings
 if TYPE_CHECKING:
     from sim_validate.hands.reaches import ReachedGrasp, Reaches
 
-REASONS = {
-    "collision": "a collision",
-    "limit": "a joint's limit",
-    "not found": "no pose found",
-    "no closure": "no three contacts close",
-}
 EXECUTION_FIGURES: Sequence[Figure] = figures(ExecutedGrasp)[1:]
 FINGERS_MEANING = "that touch at the grasp's contacts, by finger of the grasp"
 HAND_TITLE_FIGURES = ("grasp", "id")

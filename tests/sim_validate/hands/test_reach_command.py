@@ -7,6 +7,7 @@ import pytest
 import grasp_core as gc
 from grasp_core.files.file_kinds import REACHES
 from sim_validate.commands.exit_codes import Exit
+from sim_validate.files.results_folder import NEAREST_PICTURE
 from sim_validate.hands.reaches import Reaches
 from sim_validate.main import main
 
@@ -22,8 +23,8 @@ def test_it_writes_poses_that_are_in_force_closure(bracket_plan, tmp_path, capsy
     assert f"{summary['reached']} of 3 grasps were reached" in said
     assert "give the folder of grasps.json as --out" in said
     assert code == (Exit.GOOD if summary["reached"] == 3 else Exit.NEGATIVE)
-    ends = ("reached", "limit", "collision", "not_found", "no_closure")
-    assert sum(summary[key] for key in ends) == 3
+    ends = ("too_large", "too_small", "palm", "limit", "collision", "not_found", "no_closure")
+    assert summary["reached"] + sum(summary[key] for key in ends) == 3
     for each in (one.reach for one in found if one.reach.reached):
         assert each.certificate.verify()
         assert gc.force_closure(each.contacts, friction=found.friction).closed
@@ -58,6 +59,21 @@ def test_a_grasp_that_is_not_reached_is_a_negative_answer(bracket_plan, tmp_path
     (only,) = answer("reach", bracket_plan, *asked, code=Exit.NEGATIVE)["reaches"]
     assert only["joints_rad"] is None
     assert "no pose was found" in only["explanation"]
+    assert only["nearest"]["gaps_m"]
+    out = tmp_path / "out"
+    assert main(["reach", str(bracket_plan), *map(str, asked), "--out", str(out)]) == Exit.NEGATIVE
+    picture = out / NEAREST_PICTURE
+    assert "with the hand plain where it came nearest" in picture.read_text()
+    shutil.copy(bracket_plan, out / "grasps.json")
+    shown = tmp_path / "shown.svg"
+    words = ["view", str(out), "--grasp", only["id"], "--picture", str(shown)]
+    assert main(words) == Exit.GOOD
+    assert shown.read_text() == picture.read_text()
+    assert main(["report", str(out), "-q"]) == Exit.GOOD
+    page = (out / "report" / "grasps" / f"{only['id']}.html").read_text()
+    assert f"pictures/{only['id']}-nearest.svg" in page
+    assert main(["reach", str(bracket_plan), "--limit", "1", "--out", str(out)]) == Exit.GOOD
+    assert not picture.exists()
 
 
 def test_what_cannot_be_reached_or_simulated_is_refused(bracket_plan, capsys):
@@ -130,4 +146,18 @@ def test_a_hand_too_weak_for_an_object_says_so(bracket_plan, tmp_path, capsys):
     assert one.reach.reached
     assert one.executed.execution is None
     assert "cannot carry its own links" in one.executed.reason
+    assert one.too_weak == one.executed.reason
     assert "not tried" in capsys.readouterr().err
+
+
+def test_motors_too_weak_for_their_links_are_counted(bracket_plan, tmp_path, capsys):
+    words = ["reach", str(bracket_plan), "--hand", "leap", "--limit", "1", "--jobs", "1"]
+    main([*words, "--torque-limit-n-m", "0.01", "--out", str(tmp_path)])
+    said = capsys.readouterr()
+    found = Reaches.read(tmp_path / REACHES)
+    (one,) = found
+    assert one.payload is None
+    assert "the hand cannot carry its own links there" in one.too_weak
+    assert found.summary["torque"] == found.summary["reached"] == 1
+    assert "in 1 of those reached, the motors are too weak" in said.out
+    assert f"{one.id}: torque: {one.too_weak}" in said.err
