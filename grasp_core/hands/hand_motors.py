@@ -66,7 +66,7 @@ def _joints(hand: Hand, stance: Stance) -> tuple[HandPlaces, Array, Array]:
     if hand.shared_motors:
         raise InputError(
             f"hand must have a motor for each joint, or rules between joints, but in {hand.name} "
-            f"{hand.shared_motors[0]}; graspproof judge simulates tendons as the file has them"
+            f"{hand.shared_motors[0]}; graspproof judge simulates tendons that are sums of joints"
         )
     found, own = places(hand, stance.joints, stance.palm_pose), hand.chains
     levers = np.array([

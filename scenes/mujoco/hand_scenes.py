@@ -32,10 +32,11 @@ with 1 / c = 0 for hard ones, and with the damping and the inertia
     C_i = c_q / k_q K_i,   m_i = m_p + a / k_q K_i (1 - K_i / c)                          (3)
 
 of dampers c_q and joint inertia a; the dampers of pads are c_q c / k_q, and m_p is their mass.
-The inertia of joints is that of rotors, which a moving palm does not load. What the squeeze adds to
-(2), as links turn under it, is in `grasp_core.hands.hand_grips`. Motors have the torque limits that
-are left when they carry their links in any orientation (see `Motors`), so links weigh nothing in
-the scene.
+Pads are pressed as planned, which motors can do that choose every squeeze (see
+`unchosen_squeezes`). The inertia of joints is that of rotors, which a moving palm does not load.
+What the squeeze adds to (2), as links turn under it, is in `grasp_core.hands.hand_grips`. Motors
+have the torque limits that are left when they carry their links in any orientation (see `Motors`),
+so links weigh nothing in the scene.
 """
 
 import math
@@ -46,6 +47,7 @@ import numpy as np
 
 from grasp_core.allowed_values import instance
 from grasp_core.arrays import Array, rounded, to_digits
+from grasp_core.closure.contacts import WRENCH, grasp_map
 from grasp_core.execution.grips import Grip
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.hands.hand import Hand
@@ -188,6 +190,18 @@ def has_pads(hand: Hand, motors: Motors) -> bool:
     least = np.linalg.eigvalsh(levers.transpose(0, 2, 1) @ levers)[:, 0]
     free = (least >= (STRETCHED * mean_lever(motors)) ** 2).all()
     return bool(hand.couplings) or not free
+
+
+def unchosen_squeezes(motors: Motors, points: Array) -> int:
+    """Count the squeezes at contacts (k, 3) that motors cannot choose, of all that balance.
+
+    Motors that turn by dy press pads by L' dy, and so squeeze with that part of it which is
+    balanced. With a basis N of balanced forces, (3k, m), they choose the squeezes N' L' dy.
+    """
+    balanced = np.linalg.svd(grasp_map(points))[2][WRENCH:].T  # of contacts that hold every way
+    shares = np.linalg.svd(balanced.T @ motors.levers.T, compute_uv=False)
+    chosen = int((shares >= STRETCHED * mean_lever(motors)).sum())
+    return balanced.shape[1] - chosen
 
 
 def finger_springs(motors: Motors, stiffness_n_per_m: float, *, pads: bool) -> Array:

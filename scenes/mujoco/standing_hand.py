@@ -10,8 +10,10 @@ slides, to go f / c beyond their zero, with their stiffness c: its spring is pre
 joints press with. Joints come first in a scene's commands, then pads; positions go finger by
 finger, each with its joints and then its pad.
 
-Fingertips stand at the places that a scene has for them. Where joints that follow others leave no
-way there, what is left, micrometres, is added to the fingertip's place on its link.
+The pose is known to be clear. Links of which simpler shapes overlap in it, such as boxes that cover
+fingertips, may pass each other. Fingertips stand at the places that a scene has for them. Where
+joints that follow others leave no way there, what is left, micrometres, is added to the fingertip's
+place on its link.
 """
 
 from dataclasses import dataclass, replace
@@ -20,6 +22,7 @@ from typing import Any, Self
 import numpy as np
 
 from grasp_core.arrays import Array, Indices, to_digits
+from grasp_core.hands.collisions import overlapping_pairs
 from grasp_core.hands.hand import Fingertip, Hand
 from grasp_core.hands.hand_arrays import HandPlaces, jacobian, places, tip_jacobians
 from grasp_core.hands.reach import Stance
@@ -54,6 +57,8 @@ class StandingHand(HandChains):
         )  # fmt: skip
         angles, pose = to_digits(begun.reaching(centers)), to_digits(pose)
         hand = begun.hand
+        if apart := overlapping_pairs(hand, angles):  # boxes that stand for blocks and meshes
+            hand = replace(hand, ignored_pairs=(*hand.ignored_pairs, *sorted(apart)))
         if hand.couplings or begun.pads is not None:
             angles = hand.drives.obeyed(angles[None])[0]
             hand = _with_tips_at(hand, stance.fingers, centers, places(hand, angles, pose))

@@ -9,6 +9,8 @@ links touch the object where it comes to them.
 from dataclasses import dataclass
 from functools import partial
 
+import numpy as np
+
 from grasp_core.allowed_values import instance
 from grasp_core.errors import InputError, NoForcesError
 from grasp_core.execution.grips import Grip, unsqueezed
@@ -25,6 +27,7 @@ from scenes.mujoco.hand_scenes import (
     held_hand_scene,
     servo_stiffness,
     strong_motors,
+    unchosen_squeezes,
 )
 from scenes.mujoco.held_scene import HeldScene
 from sim_validate.execution.execute import execution_of, result_of
@@ -101,6 +104,13 @@ class HandHolder(Holder):
         stance = closed_stance(hand, reach, self.friction)
         motors, spring = strong_motors(hand, reach), settings.tip_stiffness_n_per_m
         pads = has_pads(hand, motors)
+        points = np.array([contact.position for contact in stance.contacts])
+        if pads and (missing := unchosen_squeezes(motors, points)):
+            raise InputError(
+                f"hand must be able to choose how it squeezes, but the motors of {hand.name} leave "
+                f"{missing} of the squeezes at these contacts to chance, as joints that move "
+                "together press as one; use a hand with more motors, or fewer contacts"
+            )
         loose = unsqueezed(
             self.body, stance.contacts, self.friction, tip_radius_m=stance.tip_radii,
             stiffness=finger_springs(motors, spring, pads=pads),

@@ -5,9 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import scipy.linalg
 
 import sim_validate as sv
-from scenes.mujoco.hand_scenes import build_hand_scene
+from grasp_core.closure.contacts import grasp_map
+from grasp_core.errors import InputError
+from grasp_core.hands.hand import Coupling
+from grasp_core.hands.hand_motors import hand_motors
+from scenes.mujoco.hand_scenes import build_hand_scene, unchosen_squeezes
 from sim_validate.closure.verdict import AGREEMENT
 from sim_validate.engine.rig import closed_on
 from sim_validate.engine.schedules import TrialLoad
@@ -114,3 +119,24 @@ def test_a_record_moves_all_joints_as_they_follow():
     for posture in (record.grasp, record.squeeze):
         assert off(hand, posture[7:]) < 1e-8  # written with nine digits
     assert np.abs(record.squeeze - record.grasp).max() > 1e-2
+
+
+def test_motors_that_leave_squeezes_to_chance_execute_nothing():
+    """One motor for two fingers that bend alike: four motors, of three squeezes at three contacts.
+
+    With the thumb tied to them, too, one motor bends all, and the squeezes across are nobody's.
+    """
+    (reach, hand), body = stood("coupled"), held_object("coupled")
+    points = np.array([contact.position for contact in reach.contacts])
+    motors = hand_motors(hand, reach)
+    assert unchosen_squeezes(motors, points) == 0
+    basis = scipy.linalg.null_space(grasp_map(points))
+    few = replace(motors, levers=motors.levers[:2], limits=motors.limits[:2],
+                  gravity=motors.gravity[:2])  # fmt: skip
+    assert unchosen_squeezes(few, points) == 3 - np.linalg.matrix_rank(basis.T @ few.levers.T)
+    tied = replace(hand, couplings=tuple(
+        Coupling(joint.name, hand.joints[0].name, 1.0) for joint in hand.joints[1:]
+    ))  # fmt: skip
+    posed = replace(reach, joints=tied.drives.obeyed(reach.joints[None])[0])
+    with pytest.raises(InputError, match=r"leave \d of the squeezes at these contacts to chance"):
+        sv.execute_hand(tied, body, posed, FRICTION, hand_execution_settings(0.5 * MASS))
