@@ -15,10 +15,9 @@ def coupled_fingers_mjcf():
 
 def three_fingers_mjcf():
     """The gripper with a motor for each joint."""
-    text, rules = re.subn(
-        r"  <equality>.*</equality>\n", "", coupled_fingers_mjcf(), flags=re.DOTALL
-    )
-    assert rules == 1
+    rules = r"  <equality>.*</equality>\n"
+    text, count = re.subn(rules, "", coupled_fingers_mjcf(), flags=re.DOTALL)
+    assert count == 1
     return text
 
 
