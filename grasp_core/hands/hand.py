@@ -336,6 +336,9 @@ class Hand(Declared):
     """How the hand differs from the file that it was read from, a sentence each."""
     palm_link: str = PALM_NAME
     """Name of the palm's link in the file that the hand was read from."""
+    shared_motors: tuple[str, ...] = ()
+    """Motors that turn several joints or pull cables, a phrase each: what such a hand holds is not
+    known here, though it is posed as if each joint had a motor of its own."""
 
     def _check_together(self) -> None:
         if not FEWEST_FINGERS <= len(self.fingers) <= MOST_FINGERS:

@@ -63,6 +63,11 @@ def hand_motors(
 
 
 def _joints(hand: Hand, stance: Stance) -> tuple[HandPlaces, Array, Array]:
+    if hand.shared_motors:
+        raise InputError(
+            f"hand must have a motor for each joint, or rules between joints, but in {hand.name} "
+            f"{hand.shared_motors[0]}; graspproof judge simulates tendons as the file has them"
+        )
     found, own = places(hand, stance.joints, stance.palm_pose), hand.chains
     levers = np.array([
         jacobian(hand, found, own[finger][-1], contact.position[None])[0].T

@@ -32,7 +32,14 @@ from grasp_core.hands.hand import (
 from grasp_core.hands.hand_arrays import rotation_about
 from grasp_core.messages import shown
 from grasp_core.names import HANDS
-from scenes.hand_files.fingers import FingerChains, finger_chains, followers, joint_name, tip_of
+from scenes.hand_files.fingers import (
+    FingerChains,
+    finger_chains,
+    followers,
+    joint_name,
+    shared_motors,
+    tip_of,
+)
 from scenes.hand_files.model import NO_MASS_KG, HandModel, compiled_hand
 from scenes.hand_files.model_text import model_text, note
 
@@ -103,6 +110,7 @@ def _read(path: Path, fingertips: tuple[str, ...]) -> Hand:
             ]),
         ),
         palm_link=model.body_names[found.palm] or PALM_NAME,
+        shared_motors=shared_motors(model, found),
     )  # fmt: skip
     middle = overlapping_pairs(hand, 0.5 * hand.ranges.sum(axis=1))
     pairs = _excluded(model, found) | (middle & _close_by(hand, originals))

@@ -14,10 +14,12 @@ Rules that hold a joint at a linear function of another (`<mimic>` of URDF, `<eq
 MJCF, `<equality><tendon>` of a sum of two joints) are followed to a joint that follows none. Of
 joints that move together one is the hand's free joint: that one, if it is on the way to a fingertip
 and has a motor or no other has; otherwise the first with a motor, or the first. Joints off the way
-to a fingertip count by their ranges. Other rules are refused.
+to a fingertip count by their ranges. Two joints that a tendon keeps within a few degrees of each
+other, of which one has no motor, are coupled in the middle of that play. Other rules are refused.
 """
 
 import importlib
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Any, TypeAlias
@@ -29,7 +31,7 @@ from grasp_core.errors import InputError
 from grasp_core.hands.collisions import beyond_hull
 from grasp_core.hands.hand import FILE_DIGITS, Coupling, Fingertip, LinkShape
 from grasp_core.messages import shown
-from scenes.hand_files.model import HandModel, JointRule, mesh_points
+from scenes.hand_files.model import TIED, HandModel, JointRule, Tendon, mesh_points
 from scenes.hand_files.model_text import listed, note
 
 WORLD = 0
@@ -37,6 +39,8 @@ ACROSS = {0: (1, 2), 1: (0, 2), 2: (0, 1)}
 CORNER_SIGNS = np.array(list(product((-1.0, 1.0), repeat=3)))
 LEAST_BLOCK_ROUNDING = 1e-4
 """Least rounding of a block [m]."""
+MOST_PLAY_RAD = 0.35
+"""Largest play that a tendon of two joints leaves to one of them, for them to count as coupled."""
 MOST_WAYS = 180
 """Number of directions in which the corners of a mesh are taken that has more of them."""
 
@@ -238,7 +242,8 @@ def followers(
     """
     used = {joint for chain in found.joints for joint in chain}
     _refuse_loops(model, used)
-    lines = _lines(model, used)
+    ties = list(_ties(model, used))
+    lines = _lines([*model.joint_rules, *(rule for _, rule in ties)], model, used)
     roots = {rule.leader for joint, rule in lines.items() if joint in used and rule.leader >= 0}
     kept = list[JointRule]()
     ranges = model.joint_ranges.copy()
@@ -270,19 +275,56 @@ def followers(
         for rule in sorted(kept)
     )  # fmt: skip
     drawn = "joints that move no fingertip are drawn as the file starts, though they are coupled"
-    tendons = [t.name for t in model.tendons if used & set(t.joints) or not t.joints]
+    tendons = [t for t in model.tendons if used & set(t.joints) or not t.joints]
+    held = "joints that tendons keep together within some degrees follow each other, without play"
+    known = {*(t.name for t, _ in ties), *(t.name for t in tendons if t.motors)}
     notes = (
         *note(f"{drawn} with joints that do", aside),
-        *note("tendons are left out, as if joints had motors of their own", tendons),
-    )
+        *note(held, [t.name for t, _ in ties]),
+        *note("tendons that no motor pulls are left out", [t.name for t in tendons if t.name not in
+                                                          known]),
+    )  # fmt: skip
     return couplings, ranges, notes
 
 
-def _lines(model: HandModel, used: set[int]) -> dict[int, JointRule]:
+def shared_motors(model: HandModel, found: FingerChains) -> tuple[str, ...]:
+    """Say of each motor that pulls a tendon of the fingers' joints, or a cable, what it turns."""
+    used = {joint for chain in found.joints for joint in chain}
+    return tuple(
+        f"one motor pulls tendon {tendon.name}, "
+        + (f"which turns {listed([joint_name(model, joint) for joint in tendon.joints])}"
+           if tendon.joints else "a cable")
+        for tendon in model.tendons
+        if tendon.motors and (used & set(tendon.joints) or not tendon.joints)
+    )  # fmt: skip
+
+
+def _ties(model: HandModel, used: set[int]) -> Iterator[tuple[Tendon, JointRule]]:
+    """Yield tendons that keep two joints together, and the rule in the middle of their play.
+
+    The joint without a motor follows the other, or the second where neither has one.
+    """
+    ruled = {rule.joint for rule in model.joint_rules}
+    for tendon in model.tendons:
+        if tendon.lengths is None or tendon.motors or len(tendon.joints) != TIED:
+            continue
+        ends = list(zip(tendon.joints, tendon.factors, strict=True))
+        ends.sort(key=lambda end: not np.isnan(model.torques[end[0]]))
+        (joint, factor), (leader, other) = ends
+        low, high = tendon.lengths
+        single = np.isnan(model.torques[joint]) and joint not in ruled and {joint, leader} & used
+        if single and high - low <= MOST_PLAY_RAD * abs(factor):
+            middle = 0.5 * (low + high) / factor
+            yield tendon, JointRule(joint, leader, middle, -other / factor)
+
+
+def _lines(
+    every: Sequence[JointRule], model: HandModel, used: set[int]
+) -> dict[int, JointRule]:  # fmt: skip
     """Follow each rule to a joint that follows none, or to a constant."""
-    rules = {rule.joint: rule for rule in model.joint_rules}
-    if len(rules) < len(model.joint_rules):
-        listed_twice = [rule.joint for rule in model.joint_rules]
+    rules = {rule.joint: rule for rule in every}
+    if len(rules) < len(every):
+        listed_twice = [rule.joint for rule in every]
         _refuse(model, {j for j in rules if listed_twice.count(j) > 1}, "follow two others")
     lines = dict[int, JointRule]()
     for joint in rules:

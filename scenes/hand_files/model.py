@@ -61,6 +61,7 @@ class Tendon(NamedTuple):
     factors: tuple[float, ...]  # what their angles are multiplied with
     motors: tuple[int, ...]  # the motors that pull it
     is_held: bool  # whether its length is a constant, or a function of another's
+    lengths: tuple[float, float] | None = None  # least and largest; None for no limits
 
 
 class HandModel(NamedTuple):
@@ -293,7 +294,11 @@ def _tendons(model: mujoco.MjModel) -> tuple[Tendon, ...]:
         joints, factors = _sum_of(model, i)
         motors = np.flatnonzero(pulling & (model.actuator_trnid[:, 0] == i)).tolist()
         if not (held.get(i, 0) < 0 and len(joints) == TIED):  # else it is a rule of its joints
-            found.append(Tendon(name or f"tendon{i}", joints, factors, tuple(motors), i in held))
+            low, high = model.tendon_range[i].tolist()
+            lengths = (low, high) if model.tendon_limited[i] else None
+            found.append(
+                Tendon(name or f"tendon{i}", joints, factors, tuple(motors), i in held, lengths)
+            )
     return tuple(found)
 
 

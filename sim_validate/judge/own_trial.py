@@ -122,7 +122,7 @@ class HandTrials:
             return lost.because(f"{len(held.contacts)} contacts are left when the hand has closed")
         try:
             proof = force_closure(held.contacts, friction=self.friction)
-            if proof.closed and held.is_limp:
+            if proof.closed and held.is_balanced and held.is_limp:
                 return lost.because(
                     "no forces of the closed hand balance each other: some of its joints are "
                     "pulled by one motor together"
@@ -201,8 +201,8 @@ class ClosedHand:
     @property
     def is_limp(self) -> bool:
         """Whether motors that pull several joints can hardly squeeze the object at all."""
-        largest = float(np.linalg.norm(self.idle, axis=1).max(initial=0.0))
-        return self.is_balanced and largest < LEAST_SQUEEZE * self.trials.push_n
+        largest = float(np.linalg.norm(self._resting(), axis=1).max(initial=0.0))
+        return largest < LEAST_SQUEEZE * self.trials.push_n
 
     def _resting(self) -> Array:
         """Return forces without a load that motors can exert: means of those at limits, (k, 3) [N].

@@ -8,6 +8,8 @@ import pytest
 import grasp_core as gc
 from grasp_core.errors import InputError
 from grasp_core.hands.hand import Coupling
+from sim_validate.hands.known_hand import hinged_hand
+from sim_validate.hands.known_hand import stance as known_stance
 from tests.grasp_core.hands.gripping import lifting_work, material_point, reaches
 
 STEP = 1e-6
@@ -76,3 +78,9 @@ def test_without_limits_masses_or_a_pose_there_are_no_motors():
     nowhere = gc.HandReach("allegro", "c-0-1-2-3", "limit", "nothing was found", 5, 0.0)
     with pytest.raises(InputError, match="must have a pose, got none for grasp c-0-1-2-3"):
         gc.hand_motors(strong("allegro"), nowhere)
+
+
+def test_what_a_motor_of_several_joints_holds_is_not_known():
+    hand = replace(hinged_hand(), shared_motors=("one motor pulls tendon t, which turns a, b",))
+    with pytest.raises(InputError, match="tendon t, which turns a, b; graspproof judge"):
+        gc.hand_motors(hand, known_stance(0.5))

@@ -16,6 +16,9 @@ from tests.judges import random_contacts
 
 LARGEST = 3.0
 DIGITS = 10**60
+UNSEEN = 1e-9
+"""Load beyond a limit that checks do see, whatever its size: balances are checked to less than a
+billionth of the largest force."""
 
 
 def exact(array):
@@ -99,7 +102,8 @@ def test_limits_near_the_critical_friction_are_attained_in_exact_arithmetic(abov
             near += found.limit < above * LARGEST * 10
             assert found.verify(x, n, mu, **given)
             # a limit that is a little larger is not attained by these forces
-            more = replace(found, limit=found.limit * (1.0 + 1e-6), upper=2.0 * found.upper)
+            larger = found.limit * (1.0 + 1e-6) + UNSEEN
+            more = replace(found, limit=larger, upper=2.0 * found.upper)
             assert not more.verify(x, n, mu, **given)
             less = replace(found, limit=0.0, forces=0.0 * found.forces, upper=found.limit)
             assert not less.verify(x, n, mu, **given)

@@ -254,7 +254,25 @@ TENDON = '<fixed name="pull"><joint joint="b0" coef="1"/><joint joint="c0" coef=
 def test_tendons_without_rules_leave_joints_free_with_a_note(tmp_path):
     hand = coupled(tmp_path, "", TENDON)
     assert hand.couplings == ()
-    assert any("tendons are left out" in note and "pull" in note for note in hand.notes)
+    assert "tendons that no motor pulls are left out: pull" in hand.notes
+
+
+def test_a_tendon_that_keeps_two_joints_together_couples_them(tmp_path):
+    """2 b + c is from -0.1 to 0.3, so that b follows c in the middle, where b has no motor."""
+    tie = TIE.replace("<fixed ", '<fixed limited="true" range="-0.1 0.3" ')
+    hand = coupled(tmp_path, "", tie)
+    found = [(c.joint, c.driver, c.ratio, c.offset) for c in hand.couplings]
+    assert found == [("b0", "c0", -0.5, pytest.approx(0.05))]
+    assert any("follow each other, without play: tie" in note for note in hand.notes)
+    loose = coupled(tmp_path, "", tie.replace("-0.1", "-1.1"))
+    assert loose.couplings == ()
+
+
+def test_motors_of_several_joints_are_told(tmp_path):
+    motor = '<actuator><position tendon="pull" kp="1"/></actuator>'
+    hand = coupled(tmp_path, f"</equality>{motor}<equality>", TENDON)
+    assert hand.couplings == ()
+    assert hand.shared_motors == ("one motor pulls tendon pull, which turns b0, c0",)
 
 
 REFUSED = {
