@@ -35,7 +35,7 @@ DOCS = sorted(page for page in SITE.parent.glob("*.md") if page != SITE)
 NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
 PAGES = {page.stem: page.read_text() for page in DOCS}
 DATASETS = PAGES["datasets"]
-WITH_FILES = {"datasets", "regions", "baselines", "start"}
+WITH_FILES = {"datasets", "regions", "baselines", "start", "own-hand"}
 """Pages whose code needs files, which tests of their own make."""
 
 
