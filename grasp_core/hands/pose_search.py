@@ -48,6 +48,7 @@ from grasp_core.hands.hand_arrays import (
     hand_arrays,
 )
 from grasp_core.hands.settings import ReachSettings
+from grasp_core.objects.on_faces import SolidSurface
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.ties import largest_first
 from grasp_core.values import FINGERS, Grasp
@@ -150,6 +151,11 @@ class AskedPose:
             corners=self.size * tree.corners, middles=self.size * tree.middles,
             radii=self.size * tree.radii,
         )  # fmt: skip
+
+    @cached_property
+    def solid(self) -> SolidSurface:
+        """Return the object's surface with its normals; blocks may also touch an edge or corner."""
+        return SolidSurface(self.size * self.body.vertices, self.body.triangles)
 
     def pose(self, contacts: int, palm: Array, origin: Array, joints: Array) -> HandPose:
         """Return a pose whose parts are still to be placed."""
@@ -354,7 +360,9 @@ def _tried(
     if rest is None:
         return MissedPose(used, aims, pose)
     laid, points = rest
-    if blocking(asked, pose, aims.fingers):
+    on_faces = (asked.solid.holds(*each, 2.0 * TIP_TOUCHING)
+                for each in zip(points, laid.normals, strict=True))  # fmt: skip
+    if blocking(asked, pose, aims.fingers) or not all(on_faces):
         return MissedPose(used, laid, pose)
     certificate = proved_closure(points, laid.normals, asked.friction)
     if certificate is None or not certificate.closed:

@@ -13,6 +13,7 @@ from grasp_core.hands.hand import Hand, HandFinger
 from grasp_core.hands.hand_arrays import places
 from grasp_core.hands.obstacles import REASONS
 from grasp_core.hands.pose_search import TIP_TOUCHING, AskedPose, starts
+from grasp_core.objects.on_faces import SolidSurface
 from tests.grasp_core.hands.gripping import FRICTION, finger, grasps, plain_hand, reaches, scaled
 
 CASES = [
@@ -245,3 +246,14 @@ def test_a_search_starts_alike_where_contacts_differ_by_rounding():
                 np.testing.assert_array_equal(getattr(one, part), getattr(other, part))
             np.testing.assert_allclose(one.palm @ one.palm.T, np.eye(3), atol=1e-15)
             assert np.linalg.det(one.palm) > 0.0
+
+
+def test_blocks_touch_faces_along_their_normals():
+    """A block that is laid on an edge has a way to the object that is no face's normal."""
+    body, hand = scaled("wedge", 0.038), gc.load_hand("leap")
+    surface = SolidSurface(body.vertices, body.triangles)
+    plan = gc.plan(body, 0.6, families=("concurrent",), limit=5)
+    found = [gc.reach_with(hand, body, grasp, 0.6, seed=1) for grasp in plan.grasps]
+    contacts = [contact for each in found for contact in each.contacts or ()]
+    assert len(contacts) >= 12
+    assert all(surface.holds(each.position, each.normal, 2e-5) for each in contacts)
