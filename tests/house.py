@@ -15,7 +15,7 @@ TOTALS = {
     "lines of packages": 67_963,
     "modules of packages": 351,
     "lines of tests": 47_143,
-    "lines of docs": 4_757,
+    "lines of docs": 4_758,
 }
 """Most that there may be. Who merges lowers a number to what the command prints. A number rises
 only with a line below that says why."""
@@ -25,7 +25,7 @@ RISES = (
     " grasp files of hands",
     "lines of tests, 45,633 to 47,143: a test for each of these, beside MuJoCo's own model of a"
     " hand's file, chains moved by hand, and readers written from a published format",
-    "lines of docs, 4,262 to 4,757: a page about a hand of one's own, columns about hands, reasons"
+    "lines of docs, 4,262 to 4,758: a page about a hand of one's own, columns about hands, reasons"
     " that stop one",
     "lines of packages, 61,173 to 65,865, modules, 304 to 338: recorded grasps are judged, in six"
     " formats, with hands as their files have them, objects of convex pieces, a trial of the whole"
