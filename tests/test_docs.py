@@ -242,7 +242,7 @@ def test_the_lines_of_python_run(tmp_path, monkeypatch, capsys):
     pytest.importorskip("pyarrow")
     build_small(tmp_path / "ds")
     monkeypatch.chdir(tmp_path)
-    loading, converting, training = blocks(DATASETS, "python")
+    loading, converting, training, *_of_hands = blocks(DATASETS, "python")
     exec(converting, {})  # noqa: S102 - it is what the page tells people to run
     capsys.readouterr()
     names = {}
