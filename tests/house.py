@@ -14,7 +14,7 @@ PACKAGES = ("grasp_core", "scenes", "sim_validate")
 TOTALS = {
     "lines of packages": 67_963,
     "modules of packages": 351,
-    "lines of tests": 47_143,
+    "lines of tests": 47_146,
     "lines of docs": 4_758,
 }
 """Most that there may be. Who merges lowers a number to what the command prints. A number rises
@@ -23,7 +23,7 @@ RISES = (
     "lines of packages, 65,865 to 67,963, modules, 338 to 351: hands throughout: joints that follow"
     " others and tendons in every simulation, datasets with any hand, what stops a hand, and Isaac"
     " grasp files of hands",
-    "lines of tests, 45,633 to 47,143: a test for each of these, beside MuJoCo's own model of a"
+    "lines of tests, 45,633 to 47,146: a test for each of these, beside MuJoCo's own model of a"
     " hand's file, chains moved by hand, and readers written from a published format",
     "lines of docs, 4,262 to 4,758: a page about a hand of one's own, columns about hands, reasons"
     " that stop one",
